@@ -13,6 +13,7 @@
 //! | [`track`] | the line as surveyed: alignment, cross-sections, lamps, devices; networks in plan |
 //! | [`bus`] | what travels between the world and the stack, as plain data |
 //! | [`stack`] | the real thing: lamp decoding, positioning, track occupancy, obstacle detection, protection |
+//! | `files` | results on the disk: whole or not there, listed by folder |
 //! | `twin` | the world: geometry, physics, renderers, sensors, links, faults |
 //! | `scenario` | the files a user writes |
 //! | `session` | one loop over world, sensors, links and equipment, scored against the truth |
@@ -29,6 +30,8 @@
 extern crate self as metrotwin;
 
 pub mod bus;
+#[cfg(feature = "cli")]
+mod files;
 mod numerics;
 pub mod settings;
 pub mod stack;

@@ -20,7 +20,7 @@ pub(super) fn report_on(
         return Ok(report::vehicle(&scenario::parse_vehicle(path, text)?));
     }
     let template = match kind {
-        FileKind::Study => Some(Template::from_text(path, text.to_owned())?),
+        FileKind::Study => Some(Template::from_text(path, text.to_owned(), overrides)?),
         _ => None,
     };
     let scenario = Scenario::from_text(path, text, overrides)?;

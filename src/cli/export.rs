@@ -3,7 +3,8 @@
 use super::check::read;
 use super::fault::Failure;
 use super::file_kind::FileKind;
-use super::{print, write_whole};
+use super::print;
+use super::result_file::{refuse_taken, write_whole};
 use crate::track::geodesy::Datum;
 use crate::track::network::{Crossing, Network, TrackEnd};
 use crate::track::{Alignment, Direction, Track, TrackPoint, Tunnel};
@@ -41,11 +42,21 @@ enum ExportFormat {
         /// Write to this file instead of standard output
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
+        /// Write over a file that is there
+        #[arg(long, requires = "out")]
+        force: bool,
     },
 }
 
 pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
-    let ExportFormat::Geojson { tunnel: path, out } = &args.format;
+    let ExportFormat::Geojson {
+        tunnel: path,
+        out,
+        force,
+    } = &args.format;
+    if let Some(out) = out {
+        refuse_taken(out, "--out", *force)?;
+    }
     let text = read(path)?;
     FileKind::refuse_other_than_tunnel(path, &text)?;
     let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;

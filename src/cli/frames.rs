@@ -1,9 +1,10 @@
 //! `metrotwin frames`: images with labels, as a data set, from any scenario.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals};
+use super::folder::{self, prepare};
+use super::print;
+use super::running::{ProgressBar, RUN_BAR, STOP, seed, stop_on_signals};
 use super::scenario_fault::load_scenario;
-use super::{print, running};
 use crate::record::dataset::{DataSet, FolderError, FramePlan, LabelKinds, Provenance};
 use crate::scenario::sampling::Inputs;
 use crate::scenario::{Override, Scenario};
@@ -90,9 +91,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let overrides = args.overrides.iter();
     let provenance = Provenance {
         inputs: Some(Inputs::of_scenario(&args.scenario, &scenario.file).map_err(Failure::run)?),
-        overrides: overrides
-            .map(|o| format!("{}={}", o.key, o.value))
-            .collect(),
+        overrides: overrides.map(Override::assignment).collect(),
     };
     let progress = ProgressBar::new(RUN_BAR);
     let to_s = plan.to_s.min(scenario.file.duration_s);
@@ -168,7 +167,7 @@ fn unusable(out: &Path, error: &FolderError) -> Failure {
              that it lists are then removed, and nothing else"
         }
         FolderError::Taken(_) => "choose another folder with --out, or move that file away",
-        FolderError::Io(error) => return running::unusable(out, error),
+        FolderError::Io(error) => return folder::unusable(out, error),
     };
     Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }

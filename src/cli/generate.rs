@@ -1,10 +1,11 @@
 //! `metrotwin generate`: concrete scenarios drawn from a template.
 
 use super::fault::Failure;
+use super::folder::{prepare, unusable};
 use super::print;
-use super::running::{prepare, seed, unusable};
+use super::running::seed;
 use super::scenario_fault::load_template;
-use crate::record::{self, Listing};
+use crate::files::{self, Listing};
 use crate::scenario::sampling::{Inputs, ScenarioSample, Template, read_input};
 use std::collections::BTreeSet;
 use std::io;
@@ -54,7 +55,7 @@ const INPUTS: &str = "inputs";
 const INDEX: &str = "index.csv";
 
 pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
-    let template = load_template(&args.scenario)?.with(args.seed, Some(args.number));
+    let template = load_template(&args.scenario, &[])?.with(args.seed, Some(args.number));
     let samples = (0..u64::from(args.number)).map(|k| template.sample(k));
     let samples = samples.collect::<Result<Vec<_>, _>>();
     let samples =
@@ -96,8 +97,8 @@ fn claim(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
     let out = args.out.display();
     let unusable = |error: io::Error| unusable(&args.out, &error);
     let names = names.iter().map(String::as_str);
-    if let Some(name) = record::foreign(&args.out, COMMAND, names.clone()).map_err(unusable)? {
-        return Err(unusable(record::why_foreign(&args.out, COMMAND, name)));
+    if let Some(name) = files::foreign(&args.out, COMMAND, names.clone()).map_err(unusable)? {
+        return Err(unusable(files::why_foreign(&args.out, COMMAND, name)));
     }
     if args.out.join(INDEX).exists() && !args.force {
         return Err(Failure::input(
@@ -144,16 +145,16 @@ fn write(
     samples: &[ScenarioSample],
 ) -> io::Result<()> {
     let listing = Listing::claim(out, COMMAND, names)?;
-    record::remove(&out.join(INDEX))?;
-    inputs.copy_to(&out.join(INPUTS), record::write_whole)?;
+    files::remove(&out.join(INDEX))?;
+    inputs.copy_to(&out.join(INPUTS), files::write_whole)?;
     for sample in samples {
         let text = template.text_of(sample, inputs, Path::new(INPUTS));
         let text = text.map_err(io::Error::other)?;
-        record::write_whole(&out.join(file_name(template, sample)), text.as_bytes())?;
+        files::write_whole(&out.join(file_name(template, sample)), text.as_bytes())?;
     }
     listing.close()?;
     let index = index(template, samples).map_err(io::Error::other)?;
-    record::write_whole(&out.join(INDEX), &index)
+    files::write_whole(&out.join(INDEX), &index)
 }
 
 /// The table of all scenarios, as comma-separated values.

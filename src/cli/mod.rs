@@ -21,9 +21,11 @@ mod excerpt;
 mod export;
 mod fault;
 mod file_kind;
+mod folder;
 mod import;
 mod locate;
 mod map;
+mod result_file;
 mod tunnel;
 
 /// What needs the simulated world.
@@ -58,9 +60,7 @@ pub use check::check_text;
 
 use clap::{ArgAction, Parser, Subcommand};
 use fault::Failure;
-use std::fs;
 use std::io::{IsTerminal, Write};
-use std::path::Path;
 use std::process::ExitCode;
 use tracing::level_filters::LevelFilter;
 
@@ -162,26 +162,6 @@ fn start_messages(verbose: u8) {
         .without_time()
         .init();
     fault::set_style();
-}
-
-/// Writes a file: whole or not at all.
-fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    let write = || {
-        if let Some(folder) = folder {
-            fs::create_dir_all(folder)?;
-        }
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let part = path.with_file_name(format!(".{name}.part"));
-        fs::write(&part, text)?;
-        fs::rename(part, path)
-    };
-    write().map_err(|error: std::io::Error| {
-        let what = format!("cannot write {}", path.display());
-        Failure::run(anyhow::Error::new(error).context(what))
-    })
 }
 
 /// Writes a result to standard output; a closed pipe is no failure.

@@ -5,7 +5,7 @@ use crate::bus::TrainId;
 use crate::scenario::{OnboardSettings, Scenario, WaysidePost};
 use crate::session::FieldOfView;
 use crate::track::network::{Itinerary, Network, SwitchLeg};
-use crate::track::{BED_M, TrackId, TrackPoint};
+use crate::track::{BED_M, CrossSection, TrackId, TrackPoint};
 use crate::twin::physics::{ObstacleSettings, TrainSettings};
 
 /// Everything that `check` and `run` say of it.
@@ -14,6 +14,7 @@ pub(super) fn of(scenario: &Scenario) -> Vec<String> {
         [
             without_position(onboard, scenario),
             without_receiver(onboard, scenario),
+            without_sky(onboard, scenario),
             told_wrong_position(onboard, scenario),
             without_lamps(onboard, scenario),
         ]
@@ -251,6 +252,27 @@ fn without_receiver(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
             _ => "gnss = {} in its [[onboard]]",
         }
     ))
+}
+
+/// A satellite receiver that is in tunnels all the way.
+fn without_sky(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
+    onboard.gnss.as_ref()?;
+    let train = scenario.physics.trains.get(usize::from(onboard.train))?;
+    let [from_m, to_m] = way_m(onboard, scenario)?;
+    let tail_m = from_m - train.length_m();
+    let sections = &scenario.along(onboard.id())?.sections;
+    let mut on_way = sections
+        .iter()
+        .filter(|r| r.from_m < to_m && r.to_m > tail_m);
+    // A shared section is that of a neighbour, which may be open.
+    let is_closed = |section: &CrossSection| !section.is_open() && !section.is_shared();
+    on_way.all(|range| is_closed(&range.section)).then(|| {
+        format!(
+            "the satellite receiver of {} never sees the sky, for all of its way is in a tunnel: it gives no fix; \
+             sections of kind \"open\" in the tunnel file are under the sky",
+            train_name(scenario, onboard.id())
+        )
+    })
 }
 
 /// Whether a train runs over a balise on its way.

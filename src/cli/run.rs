@@ -1,10 +1,12 @@
 //! `metrotwin run`: one scenario, from start to summary.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals, unusable};
+use super::folder::{prepare, unusable};
+use super::running::{ProgressBar, RUN_BAR, STOP, seed, stop_on_signals};
 use super::scenario_fault::load_scenario;
 use super::{notes, print, table};
-use crate::record::{self, FixTable, Listing, Recording};
+use crate::files::{self, Listing};
+use crate::record::{self, FixTable, Recording};
 use crate::scenario::sampling::ScenarioSample;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
@@ -109,7 +111,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     // What an earlier run has left would not belong to this summary.
     let written = listing
         .close()
-        .and_then(|()| record::write_whole(&out.join(SUMMARY), format!("{text}\n").as_bytes()));
+        .and_then(|()| files::write_whole(&out.join(SUMMARY), format!("{text}\n").as_bytes()));
     written
         .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write summary.json")))?;
     if args.json {

@@ -1,14 +1,10 @@
 //! What subcommands that run a scenario share.
 
-use super::fault::Failure;
 use super::signals::{self, Signal};
-use crate::record;
 use crate::scenario::MOST_SEED;
 use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressStyle;
 use std::cell::Cell;
-use std::io::{self, ErrorKind};
-use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -43,27 +39,6 @@ const SENT_TWICE: Duration = Duration::from_secs(1);
 /// Seeds that a file can hold.
 pub(super) fn seed() -> RangedU64ValueParser {
     RangedU64ValueParser::new().range(..=MOST_SEED as u64)
-}
-
-/// Makes the folder for results, and makes sure that files can be written there.
-pub(super) fn prepare(out: &Path) -> Result<(), Failure> {
-    record::probe(out).map_err(|error| {
-        let what = format!("cannot write into {}: {error}", out.display());
-        Failure::input(
-            what,
-            "choose another folder with --out, or make that one writable",
-        )
-    })
-}
-
-/// What is said of a folder in which a command cannot write its files.
-pub(super) fn unusable(out: &Path, error: &io::Error) -> Failure {
-    let remedy = match error.kind() {
-        ErrorKind::ResourceBusy => "wait for it to end, or choose another folder with --out",
-        ErrorKind::AlreadyExists => "choose another folder with --out, or move what is there away",
-        _ => "choose another folder with --out",
-    };
-    Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }
 
 /// How far something is: a bar on a terminal, else a line at the start and for every tenth.

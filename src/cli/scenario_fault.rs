@@ -22,10 +22,10 @@ pub(super) fn load_scenario(path: &Path, overrides: &[Override]) -> Result<Scena
 }
 
 /// A study's scenario.
-pub(super) fn load_template(path: &Path) -> Result<Template, Failure> {
+pub(super) fn load_template(path: &Path, overrides: &[Override]) -> Result<Template, Failure> {
     let text = scenario::read(path)?;
     refuse_other(path, &text)?;
-    Ok(Template::from_text(path, text)?)
+    Ok(Template::from_text(path, text, overrides)?)
 }
 
 /// Every key of a tunnel or a vehicle would be unknown in a scenario: what it is says more.

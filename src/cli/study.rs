@@ -1,11 +1,13 @@
 //! `metrotwin study`: many runs, and what they come to.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, STOP, prepare, stop_on_signals};
+use super::folder::prepare;
+use super::running::{ProgressBar, STOP, stop_on_signals};
 use super::scenario_fault::load_template;
 use super::{print, signals};
 use crate::record::parquet::Kind;
 use crate::record::render;
+use crate::scenario::Override;
 use crate::session::RendererChoice;
 use crate::study::{
     self, Digest, MEASURES, MOST_SHARDS, Options, Progress, RUN_LIMIT_S, Row, Shard, Study,
@@ -59,7 +61,7 @@ Into the output folder go:
   report.html    figures with intervals, plots, worst runs; the plots as SVG in plots/
   rows.parquet   a row a run: what was drawn, what came out, with units and meanings in the schema
   rows.jsonl     the same as they came, appended and synced: a kill loses the runs in flight at most
-  study.json     hashes of all inputs, version, renderer; a study goes on only while they are the same
+  study.json     hashes of all inputs, --set, version, renderer; a study goes on only while they are the same
   inputs/        copies of all inputs, from which any run can be made again
   study.lock     locked while a command writes there
   files.txt      the list of these files; others are never written over
@@ -79,6 +81,10 @@ struct RunArgs {
     /// Number of runs, of a sweep for each combination [default: the study's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     runs: Option<u32>,
+    /// Change a value of the study's scenario in all runs, e.g. train.cars=2; may be given again, and with --resume as
+    /// before
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
     /// Workers, each a process and a core's work [default: one a core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
@@ -201,7 +207,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
 }
 
 fn run(args: &RunArgs) -> Result<(), Failure> {
-    let template = load_template(&args.study)?.with(None, args.runs);
+    let template = load_template(&args.study, &args.overrides)?.with(None, args.runs);
     let out = args.out.clone().unwrap_or_else(|| {
         let out = Path::new("out").join(&template.file.name);
         args.shard
@@ -266,7 +272,7 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
 }
 
 fn submit(args: &SubmitArgs) -> Result<(), Failure> {
-    let template = load_template(&args.study)?.with(None, args.runs);
+    let template = load_template(&args.study, &[])?.with(None, args.runs);
     study::check(&template, true)?;
     let name = template.file.name.clone();
     let out = args

@@ -33,7 +33,6 @@ mod blueprint;
 pub mod dataset;
 mod image_encoder;
 mod images;
-mod listing;
 mod map;
 mod moving;
 mod palette;
@@ -47,13 +46,11 @@ mod template;
 mod texts;
 mod whole_files;
 
-pub(crate) use listing::{LIST, Listing, foreign, why_foreign};
 pub(crate) use recording_file::names_of_recording;
 #[cfg(test)]
 pub(crate) use tables::FIX_COLUMNS;
 pub use tables::FixTable;
 pub(crate) use template::render;
-pub(crate) use whole_files::{create_new, open_in_place, probe, remove, write_whole};
 
 use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;

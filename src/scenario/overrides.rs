@@ -99,9 +99,16 @@ impl FromStr for Override {
     }
 }
 
+impl Override {
+    /// As `key=value`, which reads as the same change.
+    pub fn assignment(&self) -> String {
+        format!("{}={}", self.key, self.value)
+    }
+}
+
 impl fmt::Display for Override {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "--set {}={}", self.key, self.value)
+        write!(f, "--set {}", self.assignment())
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::stop::Precision;
 use super::{INPUTS, MANIFEST, Manifest, Result, Row, StudyError, journal};
+use crate::scenario::read;
 use crate::scenario::sampling::Template;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +23,12 @@ impl Study {
         let manifest =
             Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
         manifest.check_copies(folder)?;
-        let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
+        let path = folder.join(INPUTS).join(&manifest.study);
+        let set = manifest.overrides().map_err(|what| StudyError::Manifest {
+            path: folder.join(MANIFEST),
+            what,
+        })?;
+        let mut template = Template::from_text(&path, read(&path)?, &set)?;
         template.settings.runs = runs_of_cell(folder, &manifest, &template)?;
         Ok(Self {
             folder: folder.to_owned(),

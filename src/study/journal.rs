@@ -5,7 +5,7 @@ use super::{
     MANIFEST, Manifest, REPORT, Result, Row, Status, StudyError, announce, not_read, not_written,
     table::TABLE,
 };
-use crate::record::open_in_place;
+use crate::files::open_in_place;
 use crate::settings::open_regular;
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -189,6 +189,7 @@ mod tests {
             program: String::new(),
             study: "study.toml".into(),
             inputs: BTreeMap::new(),
+            set: Vec::new(),
             runs: 4,
             renderer: Backend {
                 backend: String::new(),

@@ -2,6 +2,7 @@
 //! folder were made with.
 
 use super::{Result, Row, Shard, StudyError, not_read, write_whole};
+use crate::scenario::Override;
 use crate::scenario::sampling::{Inputs, MOST_RUNS, Template, read_input, sha256};
 use crate::session::RendererChoice;
 use crate::settings::{ReadLimit, read_bytes};
@@ -28,6 +29,9 @@ pub struct Manifest {
     pub study: PathBuf,
     /// SHA-256 of every input file, by its path below [`INPUTS`].
     pub inputs: BTreeMap<String, String>,
+    /// What `--set` changed in the study's file, as `key=value`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<String>,
     /// Number of runs, all shards together.
     pub runs: u64,
     /// What draws.
@@ -74,6 +78,7 @@ impl Manifest {
             program: program_hash().map_err(StudyError::Worker)?,
             study: inputs.study.clone(),
             inputs: inputs.hashes().map_err(unreadable)?,
+            set: template.set.iter().map(Override::assignment).collect(),
             runs: template.runs(),
             renderer: renderer.clone(),
             shard,
@@ -112,11 +117,19 @@ impl Manifest {
                 "`inputs` names `{file}`, which is neither absolute nor a path below {INPUTS} without `..`"
             ));
         }
+        self.overrides()?;
         if !(1..=MOST_RUNS).contains(&self.runs) {
             let runs = self.runs;
             return Err(format!("`runs` is {runs}, not from 1 to {MOST_RUNS}"));
         }
         Ok(self)
+    }
+
+    /// What `--set` changed; fails where that cannot be read.
+    pub fn overrides(&self) -> Result<Vec<Override>, String> {
+        let set = self.set.iter().map(|text| text.parse::<Override>());
+        let set: Result<_, _> = set.collect();
+        set.map_err(|error| format!("`set`: {error}"))
     }
 
     /// Writes it into a folder, whole or not at all.
@@ -181,6 +194,13 @@ impl Manifest {
         }
         if let Some(file) = now.inputs.keys().find(|f| !self.inputs.contains_key(*f)) {
             return Some(format!("{file} is a new input"));
+        }
+        if self.set != now.set {
+            let all = |set: &[String]| match set {
+                [] => "none".to_owned(),
+                set => set.join(" "),
+            };
+            return changed("--set", &all(&self.set), &all(&now.set));
         }
         if self.metrotwin != now.metrotwin {
             return changed("version of metrotwin", &self.metrotwin, &now.metrotwin);

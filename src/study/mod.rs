@@ -62,7 +62,7 @@ pub use slurm::{Submission, Submitted};
 pub use swept::{ByValue, SweptDigest, ValueDigest};
 pub use worker::{ScenarioRunner, serve};
 
-use crate::record::{self, LIST, Listing};
+use crate::files::{self, LIST, Listing};
 use crate::scenario::ScenarioError;
 use crate::scenario::sampling::{Inputs, SampleError};
 use crate::session::ObserverError;
@@ -213,12 +213,12 @@ fn copy_inputs(folder: &Path, inputs: &Inputs) -> Result {
         folder,
         names.map(|name| name.to_string_lossy().into_owned()),
     )?;
-    let copied = inputs.copy_to(&folder.join(INPUTS), record::write_whole);
+    let copied = inputs.copy_to(&folder.join(INPUTS), files::write_whole);
     copied.map_err(|source| StudyError::file(folder, source))
 }
 
 fn write_whole(path: &Path, content: &[u8]) -> Result {
-    record::write_whole(path, content).map_err(|source| StudyError::file(path, source))
+    files::write_whole(path, content).map_err(|source| StudyError::file(path, source))
 }
 
 fn advice(source: &io::Error) -> &'static str {

@@ -1,7 +1,7 @@
 //! Workers: processes that each run one scenario after the other.
 
 use super::{Result, Row, Status, StudyError};
-use crate::record;
+use crate::files;
 use crate::scenario::sampling::Template;
 use std::collections::VecDeque;
 use std::fs;
@@ -163,7 +163,7 @@ impl Worker {
             .arg(pool.folder)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(record::create_new(&log)?);
+            .stderr(files::create_new(&log)?);
         // A worker is a core's work: none beside the driver's own thread.
         for (variable, threads) in [("LP_NUM_THREADS", "0"), ("RAYON_NUM_THREADS", "1")] {
             if std::env::var_os(variable).is_none() {

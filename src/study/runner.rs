@@ -6,7 +6,7 @@ use super::manifest;
 use super::pool::{Next, Pool, worker_log};
 use super::stop::Precision;
 use super::{Manifest, Result, Row, Shard, Status, StudyError, announce, copy_inputs, table};
-use crate::record;
+use crate::files;
 use crate::scenario::sampling::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
 use crate::settings::Problem;
@@ -86,7 +86,7 @@ pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>> 
 pub fn run(template: &Template, folder: &Path, options: &Options<'_>) -> Result<Vec<Row>> {
     let precision = check(template, options.shard.is_some())?;
     let renderer = manifest::renderer(options.renderer)?;
-    record::probe(folder).map_err(|source| StudyError::Unwritable {
+    files::probe(folder).map_err(|source| StudyError::Unwritable {
         path: folder.to_owned(),
         source,
     })?;

@@ -212,6 +212,7 @@ fn no_table_breaks_a_reader() {
         line_number: 1,
         datum: None,
         heading_deg: 0.0,
+        is_open: false,
     };
     for case in cases(FEW) {
         let draw = &mut Draw::of(case);

@@ -485,3 +485,23 @@ fn the_driver_says_nothing_of_a_desktop() {
         assert!(is_set, "no XDG_RUNTIME_DIR in {environment}");
     }
 }
+
+/// Fails where nothing says that a receiver gives no fix, or one that comes out of a tunnel is said to give none.
+#[test]
+fn a_receiver_in_a_tunnel_is_noted() {
+    for (scenario, is_hidden) in [
+        ("scenarios/line_run.toml --set gnss={}", true),
+        ("scenarios/depot_fan.toml", false),
+        ("scenarios/parallel_tracks.toml", false),
+    ] {
+        let line = format!("check {scenario}");
+        let checked = metrotwin(&line.split_whitespace().collect::<Vec<_>>());
+        let said = String::from_utf8_lossy(&checked.stdout).into_owned();
+        assert!(checked.status.success(), "{checked:?}");
+        assert_eq!(
+            said.contains("never sees the sky"),
+            is_hidden,
+            "{scenario}: {said}"
+        );
+    }
+}

@@ -92,6 +92,11 @@ fn a_map_of_openstreetmap_is_a_tunnel() {
     );
     succeeds(&run);
     says(&run, "4 tracks, 1.200 km, 2 switches, 0 crossings");
+    says(&run, "in tunnel: 0.000 km of the tracks, 0 of the switches");
+    says(
+        &run,
+        "latitude 48.20000 to 48.20004, longitude 15.60000 to 15.61076 degrees",
+    );
     let said = checked(&folder);
     assert!(said.contains("to the left, 40 km/h"), "{said}");
     let text = fs::read_to_string(folder.join("out.toml")).unwrap();
@@ -151,10 +156,41 @@ fn a_map_of_openstreetmap_is_a_tunnel() {
         "osm",
         "map.json",
         &siding(),
-        &["--around", "48.2,15.6", "--radius-m", "150"],
+        &["--around", "48.2,15.6", "--radius-m", "150", "--force"],
     );
     succeeds(&run);
     says(&run, "1 tracks, 0.140 km, 0 switches");
+}
+
+/// Fails where what the map has in tunnels is counted as in the open, or the other way round.
+#[test]
+fn what_lies_in_tunnels_is_counted() {
+    let folder = folder("imported_tunnels");
+    let report = folder.join("report.json").display().to_string();
+    // Both legs at the first switch begin in the open; the line before it is cut off and in a tunnel.
+    let first: Vec<String> = (0..=10).map(|k| k.to_string()).collect();
+    let nodes = format!("\"nodes\":[{},", first.join(","));
+    let cut = format!(
+        "\"nodes\":[{}],\"tags\":{{\"railway\":\"rail\",\"tunnel\":\"yes\"}}}},\
+         {{\"type\":\"way\",\"id\":3,\"nodes\":[10,",
+        first.join(",")
+    );
+    let map = siding();
+    assert!(map.contains(&nodes));
+    let run = import(
+        &folder,
+        "osm",
+        "map.json",
+        &map.replacen(&nodes, &cut, 1),
+        &["--report", &report],
+    );
+    succeeds(&run);
+    says(&run, "1.200 km, 2 switches");
+    says(&run, "in tunnel: 0.200 km of the tracks, 1 of the switches");
+    let report: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(report).unwrap()).unwrap();
+    assert_eq!(report["in_tunnel"]["switches"], 1);
+    checked(&folder);
 }
 
 #[test]
@@ -173,12 +209,27 @@ fn tables_are_a_tunnel() {
     ];
     let run = import(&folder, "csv", "line.csv", ALIGNMENT, &more);
     succeeds(&run);
-    says(&run, "700.000 m, 5 elements, 2 grades, 2 lamps");
+    says(
+        &run,
+        "700.000 m, 5 elements, 2 grades, 2 lamps; in a tunnel",
+    );
     let said = checked(&folder);
     assert!(
         said.contains("km 12.000") && said.contains("tightest radius 500 m"),
         "{said}"
     );
+    let run = import(
+        &folder,
+        "csv",
+        "line.csv",
+        ALIGNMENT,
+        &["--open", "--force"],
+    );
+    succeeds(&run);
+    says(&run, "0 lamps; in the open");
+    let written = fs::read_to_string(folder.join("out.toml")).unwrap();
+    assert!(written.contains("\"open\""), "{written}");
+    checked(&folder);
 }
 
 #[test]
@@ -265,8 +316,75 @@ fn wrong_maps_are_refused() {
         &["--datum", "104.066,30.657"],
         "latitude and longitude",
     );
-    let run = program(["import", "osm", "none.json", "--out", "out/none.txt"])
-        .output()
-        .unwrap();
-    refuses(&run, "none.json");
+    for (out, told) in [
+        ("out/none.txt", "none.txt is no name of a tunnel file"),
+        ("out/none.toml", "none.json"),
+    ] {
+        let run = program(["import", "osm", "none.json", "--out", out])
+            .output()
+            .unwrap();
+        refuses(&run, told);
+    }
+}
+
+/// Fails where a file that was there is lost without `--force`, is not replaced with it, or one of two files is written
+/// though the other cannot be.
+#[test]
+fn files_that_are_there_are_kept() {
+    let folder = folder("kept");
+    let [out, report, map] =
+        ["out.toml", "report.json", "out.geojson"].map(|name| folder.join(name));
+    let [csv, railml] = [
+        ("csv", "line.csv", ALIGNMENT),
+        ("railml", "line.railml", RAILML),
+    ];
+    let text = |path: &Path| fs::read_to_string(path).unwrap();
+    let refused = |run: &Output, path: &Path| {
+        refuses(run, &format!("{} is there already", path.display()));
+        says(run, "--force");
+        assert_eq!(text(path), "mine");
+    };
+
+    fs::write(&out, "mine").unwrap();
+    for (format, file, content) in [csv, railml] {
+        refused(&import(&folder, format, file, content, &[]), &out);
+    }
+    fs::write(&report, "mine").unwrap();
+    fs::remove_file(&out).unwrap();
+    let option = ["--report", &report.display().to_string()].map(str::to_owned);
+    let import_both = |more: &[&str]| {
+        let more: Vec<&str> = option
+            .iter()
+            .map(String::as_str)
+            .chain(more.iter().copied())
+            .collect();
+        import(&folder, railml.0, railml.1, railml.2, &more)
+    };
+    refused(&import_both(&[]), &report);
+    assert!(!out.exists());
+    succeeds(&import_both(&["--force"]));
+    assert!(text(&report).contains("counts") && text(&out).contains("datum"));
+
+    let export = |more: &[&str]| {
+        let [tunnel, map] = [&out, &map].map(|path| path.display().to_string());
+        let args = ["export", "geojson", &tunnel, "--out", &map];
+        program(args.iter().chain(more)).output().unwrap()
+    };
+    fs::write(&map, "mine").unwrap();
+    refused(&export(&[]), &map);
+    succeeds(&export(&["--force"]));
+    assert!(text(&map).contains("FeatureCollection"));
+    // One name for two files, and a folder.
+    let same = ["--report", &out.display().to_string(), "--force"].map(str::to_owned);
+    let same: Vec<&str> = same.iter().map(String::as_str).collect();
+    refuses(
+        &import(&folder, railml.0, railml.1, railml.2, &same),
+        "give them two names",
+    );
+    fs::remove_file(&out).unwrap();
+    fs::create_dir(&out).unwrap();
+    refuses(
+        &import(&folder, csv.0, csv.1, csv.2, &["--force"]),
+        "is a folder",
+    );
 }

@@ -492,6 +492,72 @@ fn submit_refuses_what_a_script_would_read_otherwise() {
     fs::remove_dir_all(base).ok();
 }
 
+/// Fails where `--set` gives other rows than the same value in the file, a study goes on with other values than it began
+/// with, a replay or a merge forgets them, or a draw takes them back.
+#[test]
+fn a_study_may_set_values_for_all_runs() {
+    let base = folder("set");
+    let set = "--set duration_s=0.5 --set name=shorter";
+    let out = base.join("set");
+    succeeds(&study(&out, &format!("--runs 1 {set}")));
+    let file = changed(&base, "duration_s = 1.5", "duration_s = 0.5");
+    let edited = base.join("edited");
+    succeeds(&study_of(&file, &edited, "--runs 1"));
+    same(&out, &edited);
+    let whole = base.join("whole");
+    succeeds(&study(&whole, "--runs 1"));
+    let [a, b] = [&out, &whole].map(|path| path.display().to_string());
+    assert!(
+        !run(&format!("study compare {a} {b} --same"))
+            .status
+            .success()
+    );
+
+    let rows = fs::read_to_string(out.join("rows.jsonl")).unwrap();
+    for (more, told) in [
+        ("", "--set: duration_s=0.5 name=\"shorter\" then, none now"),
+        (
+            "--set duration_s=0.6 --set name=shorter",
+            "--set: duration_s=0.5",
+        ),
+    ] {
+        refuses(&study(&out, &format!("--runs 2 --resume {more}")), told);
+    }
+    assert_eq!(fs::read_to_string(out.join("rows.jsonl")).unwrap(), rows);
+    succeeds(&study(&out, &format!("--runs 2 --resume {set}")));
+    assert_eq!(read_rows(&out).unwrap().len(), 4);
+    let replay = run(&format!(
+        "run --from-study {a} --index 1 --no-recording --renderer cpu"
+    ));
+    succeeds(&replay);
+    says(&replay, "equal to its row in the study");
+    says(&replay, "shorter: 0.5 s simulated");
+
+    let shards = base.join("shards");
+    for k in 1..=2 {
+        let folder = shards.join(format!("shard-{k}-of-2"));
+        succeeds(&study(&folder, &format!("--runs 2 --shard {k}/2 {set}")));
+    }
+    succeeds(&run(&format!("study merge {}", shards.display())));
+    same(&out, &shards);
+
+    let none = base.join("none");
+    for (more, told) in [
+        (
+            "--set train.cars=3",
+            "train.cars: is drawn by the study's variable `cars`",
+        ),
+        ("--set train={cars=3}", "is drawn by the study's variable"),
+        ("--set seed=3", "seed: is drawn for each run"),
+        ("--set duration=3", "duration"),
+        ("--set duration_s=-3", "duration_s"),
+    ] {
+        refuses(&study(&none, more), told);
+        assert!(!none.exists(), "{more}");
+    }
+    fs::remove_dir_all(base).ok();
+}
+
 /// Weights that are not those of the densities: an event of probability 1e-5, from 1500 runs.
 /// P(N(0, 2) > 6.0316) = 1.0000e-5; a run in the proposal hits half of the time, and the estimate's own
 /// sigma is 4 % (checked below by its interval); the bound of 30 % is the one that users were promised.

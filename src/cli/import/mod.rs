@@ -5,7 +5,8 @@ mod told;
 use super::check::read_as;
 use super::fault::Failure;
 use super::map::{read_map, read_osm, read_railml_map, refused};
-use super::{print, write_whole};
+use super::print;
+use super::result_file::{refuse_taken, write_whole};
 use crate::settings::ReadLimit;
 use crate::track::geodesy::Geodetic;
 use crate::track::import::railml::RailMlOptions;
@@ -49,14 +50,15 @@ turn               left or right, looking up the line; without this column a neg
 element            straight, arc or clothoid; without this column what has a radius is an arc. A clothoid runs from the
                    curvature before to that after it
 length_m           of the element; needed in the last row, if that is not the end of the line
-cant_mm            of an arc
-grade_permille     from here on, rising positive; empty: as before
+cant_mm            of an arc; or cant_m, in metres
+grade_permille     from here on, rising positive; empty: as before; or grade_percent, or grade_ratio (1:40, or -1:40 where
+                   the line falls)
 vertical_radius_m  of the curve that leads into the grade; default 3000
 
 Columns may stand in any order, with `,`, `;` or tabs between them; with `;` or tabs numbers may have a decimal comma.
 A table of lamps has the columns chainage_m, number (or uid, as 1-023), and, if there are any, lateral_m (left of the
-track positive), height_m, aim_yaw_deg, power_w. The line lies in a circular tunnel; sections, balises, stations and so
-on are added to the written file by hand.
+track positive), height_m, aim_yaw_deg, power_w. The line lies in a circular tunnel, or with --open all of it in the open;
+other sections, balises, stations and so on are added to the written file by hand.
 
 Examples:
   metrotwin import csv alignment.csv --out out/line.toml
@@ -105,6 +107,25 @@ struct Written {
     /// Write all that was left out, and how near each track is to the map, as JSON
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Write over files that are there
+    #[arg(long)]
+    force: bool,
+}
+
+impl Written {
+    /// Refuses names that cannot be written to, before anything is read.
+    fn refuse_unusable(&self) -> Result<(), Failure> {
+        refuse_ending(&self.out)?;
+        refuse_taken(&self.out, "--out", self.force)?;
+        match &self.report {
+            Some(report) if *report == self.out => Err(Failure::input(
+                format!("{} is named by --out and by --report", self.out.display()),
+                "give them two names",
+            )),
+            Some(report) => refuse_taken(report, "--report", self.force),
+            None => Ok(()),
+        }
+    }
 }
 
 #[derive(clap::Args)]
@@ -115,6 +136,9 @@ struct CsvArgs {
     /// Tunnel file to be written
     #[arg(long, value_name = "TUNNEL")]
     out: PathBuf,
+    /// Write over a file that is there
+    #[arg(long)]
+    force: bool,
     /// Table of lamps
     #[arg(long, value_name = "LAMPS")]
     lamps: Option<PathBuf>,
@@ -127,10 +151,14 @@ struct CsvArgs {
     /// Its direction there, degrees from east towards north
     #[arg(long, value_name = "H", default_value_t = 0.0, value_parser = heading, allow_hyphen_values = true)]
     heading_deg: f64,
+    /// The line lies in the open, not in a tunnel
+    #[arg(long)]
+    open: bool,
 }
 
 fn csv(args: &CsvArgs) -> Result<(), Failure> {
     refuse_ending(&args.out)?;
+    refuse_taken(&args.out, "--out", args.force)?;
     let alignment = read_as(&args.file, ReadLimit::CSV)?;
     let lamps = args
         .lamps
@@ -142,6 +170,7 @@ fn csv(args: &CsvArgs) -> Result<(), Failure> {
         line_number: args.line_number,
         datum: args.datum,
         heading_deg: args.heading_deg,
+        is_open: args.open,
     };
     let import = TableImport::read(&alignment, lamps.as_deref(), &options).map_err(|fault| {
         let path = match &args.lamps {
@@ -165,12 +194,16 @@ fn csv(args: &CsvArgs) -> Result<(), Failure> {
         eprintln!("left out: column `{header}`: it means nothing here");
     }
     print(&format!(
-        "{}: {:.3} m, {} elements, {} grades, {} lamps",
+        "{}: {:.3} m, {} elements, {} grades, {} lamps; {}",
         args.out.display(),
         import.length_m,
         import.file.plan.len(),
         import.file.grades.len(),
-        import.file.lamp.len()
+        import.file.lamp.len(),
+        match args.open {
+            true => "in the open",
+            false => "in a tunnel (--open: in the open)",
+        }
     ))
 }
 
@@ -212,6 +245,7 @@ struct RailmlArgs {
 }
 
 fn railml(args: &RailmlArgs) -> Result<(), Failure> {
+    args.written.refuse_unusable()?;
     let text = read_map(&args.file)?;
     let map = read_railml_map(&args.file, &text, &RailMlOptions { crs: args.crs })?;
     let options = LayingOptions {
@@ -231,6 +265,7 @@ pub(super) fn import(args: &ImportArgs) -> Result<(), Failure> {
 }
 
 fn osm(args: &OsmArgs) -> Result<(), Failure> {
+    args.written.refuse_unusable()?;
     let text = read_map(&args.file)?;
     let around = args.around.zip(args.radius_m);
     let around = around.map(|(place, radius_m)| AroundPlace { place, radius_m });
@@ -252,7 +287,6 @@ fn lay(
     to: &Written,
     source: &[&str],
 ) -> Result<(), Failure> {
-    refuse_ending(&to.out)?;
     let laid = map.lay(options).map_err(|error| {
         Failure::input(
             format!("{} cannot be laid: {error}", path.display()),

@@ -1,6 +1,7 @@
 //! What an import says: on the terminal, in the head of the file, and as a report.
 
 use crate::track::import::{ImportedMap, LaidMap, LaidTrack, LeftOut};
+use nalgebra::Point3;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -155,8 +156,37 @@ impl Told<'_> {
                 track.name
             );
         }
+        let in_tunnel = self.laid.in_tunnel();
+        let _ = writeln!(
+            text,
+            "in tunnel: {:.3} km of the tracks, {} of the switches",
+            in_tunnel.length_m / 1000.0,
+            in_tunnel.switches
+        );
+        if let Some([[south, north], [west, east]]) = self.bounds_deg() {
+            let _ = writeln!(
+                text,
+                "on the earth: latitude {south:.5} to {north:.5}, longitude {west:.5} to {east:.5} degrees"
+            );
+        }
         let _ = writeln!(text, "left out: {}", self.all_left_out().count());
         text
+    }
+
+    /// Latitudes and longitudes between which the map's tracks lie, degrees; none of a map without coordinates.
+    fn bounds_deg(&self) -> Option<[[f64; 2]; 2]> {
+        let network = &self.map.network;
+        let datum = network.datum?;
+        let points = network.elements.iter().flat_map(|element| element.points());
+        let places = points.map(|(point, _)| {
+            let place = datum.geodetic(&Point3::new(point.x, point.y, 0.0));
+            [place.latitude_deg, place.longitude_deg]
+        });
+        let wider = |[least, most]: [f64; 2], deg: f64| [least.min(deg), most.max(deg)];
+        places.fold(None, |bounds, [latitude, longitude]| {
+            let [a, b] = bounds.unwrap_or([[latitude; 2], [longitude; 2]]);
+            Some([wider(a, latitude), wider(b, longitude)])
+        })
     }
 
     /// All of it.
@@ -168,6 +198,7 @@ impl Told<'_> {
                 json!({ "in_file": c.in_file, "taken": c.taken }),
             )
         });
+        let in_tunnel = self.laid.in_tunnel();
         let left_out = self.all_left_out();
         let left_out =
             left_out.map(|left| json!({ "line": left.line, "what": left.what, "why": left.why }));
@@ -183,6 +214,7 @@ impl Told<'_> {
             })
         });
         serde_json::to_string_pretty(&json!({
+            "in_tunnel": { "length_m": in_tunnel.length_m, "switches": in_tunnel.switches },
             "counts": counts.collect::<serde_json::Map<_, _>>(),
             "tracks": tracks.collect::<Vec<_>>(),
             "left_out": left_out.collect::<Vec<_>>(),

@@ -6,21 +6,26 @@ mod speed_of_fixes;
 
 use super::check::read_as;
 use super::fault::Failure;
+use super::folder::{prepare, unusable};
 use super::map::read_network;
 use super::print;
 use crate::bus::SimTime;
+use crate::files::Listing;
 use crate::settings::ReadLimit;
 use crate::stack::occupancy::{Occupancy, OccupancySettings};
-use crate::track::import::Crs;
+use crate::track::import::{Crs, SheetError};
 use crate::track::plan::PlanNetwork;
 use output::{Located, Report};
-use recorded::{RecordedFix, RecordedFixes};
+use recorded::{RecordedFix, RecordedFixes, RecordedSpeeds};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Fixes that are all farther from the network are of somewhere else.
 const FAR_M: f64 = 5000.0;
+
+/// Whose files are listed.
+const COMMAND: &str = "metrotwin locate";
 
 const AFTER: &str = "\
 NETWORK is a tunnel file with a [datum], GeoJSON of track elements (LineString with `id`) and relations
@@ -29,9 +34,12 @@ railML with coordinates.
 FIXES is a table with the columns timestamp (seconds, or ISO 8601), latitude, longitude, and, if there are any,
 sigma_north_m, sigma_east_m, covariance_m2, position_type, solution_status. Without sigmas these come by the kind
 of solution. SPEEDS has timestamp and speed_mps, forwards positive. Without it, speed comes from the fixes.
+Columns may stand in any order, with `,`, `;` or tabs between them as between the headers; with `;` or tabs numbers may
+have a decimal comma.
 
 Written to DIR: tracks.csv (a row a fix: most probable element, its probability, place, way), tracks.geojson (the
-same for a map), summary.json.
+same for a map), summary.json, and files.txt, the list of these files. The next run into the folder replaces them; files
+that the list does not name are never removed or written over.
 
 Examples:
   metrotwin locate --network network.geojson --gnss run.csv --out out/run
@@ -66,22 +74,34 @@ pub(super) fn locate(args: &LocateArgs) -> Result<(), Failure> {
     refuse_elsewhere(&network, &recorded, args)?;
     let mut settings = OccupancySettings::default();
     let speeds = match &args.speed {
-        Some(path) => recorded::read_speeds(&read_as(path, ReadLimit::RECORDED)?, recorded.start_s)
+        Some(path) => RecordedSpeeds::read(&read_as(path, ReadLimit::RECORDED)?, recorded.start_s)
             .map_err(|e| table(path, &e))?,
         None => {
             settings.speed_sigma_mps = speed_of_fixes::SIGMA_MPS;
-            speed_of_fixes::speeds(&recorded.fixes)
+            RecordedSpeeds {
+                speeds: speed_of_fixes::speeds(&recorded.fixes),
+                has_decimal_commas: false,
+            }
         }
     };
-    let located = run(&network, settings, &recorded, &speeds);
+    prepare(&args.out)?;
+    // Open until the end: no other command writes into the folder meanwhile.
+    let names = output::FILES.map(str::to_owned).to_vec();
+    let listing = Listing::claim(&args.out, COMMAND, names).map_err(|e| unusable(&args.out, &e))?;
+    let located = run(&network, settings, &recorded, &speeds.speeds);
     let report = Report {
         network: &network,
         datum: &datum,
         recorded: &recorded,
         located: &located,
-        speeds_in_time: args.speed.as_ref().map(|_| in_time(&speeds, &recorded)),
+        speeds_in_time: args
+            .speed
+            .as_ref()
+            .map(|_| in_time(&speeds.speeds, &recorded)),
+        decimal_commas: decimal_commas(args, &recorded, &speeds),
     };
-    report.write(&args.out).map_err(Failure::run)?;
+    let written = report.write(&args.out).and_then(|()| listing.close());
+    written.map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write the results")))?;
     print(&report.text(&args.out))
 }
 
@@ -109,6 +129,17 @@ fn run(
         });
     }
     located
+}
+
+/// The tables in which numbers have a decimal comma.
+fn decimal_commas<'a>(
+    args: &'a LocateArgs,
+    fixes: &RecordedFixes,
+    speeds: &RecordedSpeeds,
+) -> Vec<&'a Path> {
+    let of_fixes = fixes.has_decimal_commas.then_some(args.gnss.as_path());
+    let of_speeds = args.speed.as_deref().filter(|_| speeds.has_decimal_commas);
+    of_fixes.into_iter().chain(of_speeds).collect()
 }
 
 /// Speeds between the first fix and the last.
@@ -144,7 +175,7 @@ fn refuse_elsewhere(
     ))
 }
 
-fn table(path: &Path, error: &recorded::TableError) -> Failure {
+fn table(path: &Path, error: &SheetError) -> Failure {
     Failure::input(
         format!("{} cannot be used: {error}", path.display()),
         "see `metrotwin locate --help` for the columns",

@@ -1,6 +1,7 @@
 //! What `metrotwin locate` writes.
 
 use super::recorded::{RecordedFix, RecordedFixes};
+use crate::files::write_whole;
 use crate::stack::occupancy::Decision;
 use crate::track::Direction;
 use crate::track::geodesy::Datum;
@@ -8,6 +9,9 @@ use crate::track::plan::PlanNetwork;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
+
+/// Names of the files.
+pub const FILES: [&str; 3] = ["tracks.csv", "tracks.geojson", "summary.json"];
 
 /// A decision with this probability or more is fairly confident.
 const FAIRLY: f64 = 0.9;
@@ -29,6 +33,8 @@ pub struct Report<'a> {
     pub located: &'a [Located],
     /// Of the measured speeds those of the time of the fixes; none where none were measured.
     pub speeds_in_time: Option<usize>,
+    /// Tables in which numbers have a decimal comma.
+    pub decimal_commas: Vec<&'a Path>,
 }
 
 /// A stretch of time over which one element is the most probable.
@@ -43,17 +49,10 @@ struct Visit<'a> {
 impl Report<'_> {
     /// Writes all files; each is whole or not there.
     pub fn write(&self, folder: &Path) -> std::io::Result<()> {
-        std::fs::create_dir_all(folder)?;
         let summary = serde_json::to_string_pretty(&self.summary())?;
         let map = serde_json::to_string(&self.geojson())?;
-        for (name, text) in [
-            ("tracks.csv", self.table()),
-            ("tracks.geojson", map),
-            ("summary.json", summary),
-        ] {
-            let part = folder.join(format!(".{name}.part"));
-            std::fs::write(&part, text)?;
-            std::fs::rename(part, folder.join(name))?;
+        for (name, text) in FILES.into_iter().zip([self.table(), map, summary]) {
+            write_whole(&folder.join(name), text.as_bytes())?;
         }
         Ok(())
     }
@@ -189,6 +188,12 @@ impl Report<'_> {
         let recorded = self.recorded;
         let [_, _, _, nowhere] = self.counts();
         let mut notes = Vec::new();
+        for path in &self.decimal_commas {
+            notes.push(format!(
+                "commas in the numbers of {} were taken for decimal commas, as other signs stand between its headers",
+                path.display()
+            ));
+        }
         if recorded.out_of_order > 0 {
             notes.push(format!(
                 "{} rows of the fixes are not newer than the row before, and were left out: sort the table by time, and \

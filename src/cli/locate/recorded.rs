@@ -1,10 +1,10 @@
-//! Recorded fixes and speeds: comma-separated tables with named columns.
+//! Recorded fixes and speeds: tables with named columns.
 
 use crate::bus::SimTime;
 use crate::stack::occupancy::Fix;
 use crate::track::geodesy::{Datum, Geodetic};
+use crate::track::import::{Sheet, SheetColumn, SheetError, SheetRow};
 use nalgebra::Matrix2;
-use serde::Deserialize;
 
 /// Standard deviation of a fix to the north and to the east by its kind of solution, metres, for tables that do not
 /// state one: of the receivers' makers for open sky, rounded up.
@@ -30,36 +30,22 @@ const FRAME_SIGMA_M: f64 = 1.3;
 /// A status, where there is one, of fixes that may be used.
 const COMPUTED: &str = "SOL_COMPUTED";
 
-/// A row of a table of fixes. Times are seconds, or dates and times after ISO 8601.
-#[derive(Debug, Deserialize)]
-struct FixRow {
-    #[serde(alias = "time", alias = "time_s")]
-    timestamp: String,
-    #[serde(alias = "latitude_deg", alias = "lat")]
-    latitude: f64,
-    #[serde(alias = "longitude_deg", alias = "lon")]
-    longitude: f64,
-    #[serde(default, alias = "solution", alias = "kind")]
-    position_type: String,
-    #[serde(default)]
-    solution_status: String,
-    #[serde(default)]
-    sigma_north_m: Option<f64>,
-    #[serde(default)]
-    sigma_east_m: Option<f64>,
-    /// Covariance of both.
-    #[serde(default)]
-    covariance_m2: Option<f64>,
-}
-
-/// A row of a table of speeds.
-#[derive(Debug, Deserialize)]
-struct SpeedRow {
-    #[serde(alias = "time", alias = "time_s")]
-    timestamp: String,
-    /// Forwards positive.
-    speed_mps: f64,
-}
+/// Columns of a table of fixes.
+const FIXES: [SheetColumn; 8] = [
+    TIMESTAMP,
+    SheetColumn::needed("latitude", &["latitude_deg", "lat"]),
+    SheetColumn::needed("longitude", &["longitude_deg", "lon"]),
+    SheetColumn::optional("position_type", &["solution", "kind"]),
+    SheetColumn::optional("solution_status", &[]),
+    SheetColumn::optional("sigma_north_m", &[]),
+    SheetColumn::optional("sigma_east_m", &[]),
+    // Of both.
+    SheetColumn::optional("covariance_m2", &[]),
+];
+/// Columns of a table of speeds, which are positive forwards.
+const SPEEDS: [SheetColumn; 2] = [TIMESTAMP, SheetColumn::needed("speed_mps", &[])];
+/// Seconds, or a date and time after ISO 8601.
+const TIMESTAMP: SheetColumn = SheetColumn::needed("timestamp", &["time", "time_s"]);
 
 /// A table of fixes.
 #[derive(Debug, Default)]
@@ -72,6 +58,17 @@ pub struct RecordedFixes {
     pub refused: usize,
     /// Rows that are not newer than the one before.
     pub out_of_order: usize,
+    /// Numbers have a decimal comma.
+    pub has_decimal_commas: bool,
+}
+
+/// A table of speeds.
+#[derive(Debug, Default)]
+pub struct RecordedSpeeds {
+    /// Time since the first fix, and the speed then, m/s, forwards positive.
+    pub speeds: Vec<(SimTime, f64)>,
+    /// Numbers have a decimal comma.
+    pub has_decimal_commas: bool,
 }
 
 /// One of them.
@@ -85,36 +82,29 @@ pub struct RecordedFix {
     pub kind: String,
 }
 
-/// What is wrong with a table, with its line.
-#[derive(Debug, thiserror::Error)]
-#[error("line {line}: {what}")]
-pub struct TableError {
-    line: u64,
-    what: String,
-}
-
 impl RecordedFixes {
     /// Of a text, in the plane of a datum.
-    pub fn read(text: &str, datum: &Datum) -> Result<Self, TableError> {
+    pub fn read(text: &str, datum: &Datum) -> Result<Self, SheetError> {
+        let sheet = Sheet::read(text, &FIXES)?;
         let mut read = Self::default();
         let mut last_s = f64::NEG_INFINITY;
         let mut received: Option<(f64, f64)> = None;
-        for row in rows::<FixRow>(text) {
-            let (line, row) = row?;
-            let fault = |what: String| TableError { line, what };
-            let time_s = seconds(&row.timestamp).map_err(fault)?;
-            let place = row.place().map_err(fault)?;
+        for row in sheet.rows() {
+            let row = FixRow(row?);
+            // What such a row holds besides, if anything, is no fix.
+            if !row.is_computed() {
+                read.refused += 1;
+                continue;
+            }
+            let time_s = seconds_of(&row.0)?;
+            let place = row.place()?;
             let sigma_m = match row.kind_sigma_m() {
                 Some(sigma_m) => sigma_m,
                 None => received.map_or(UNKNOWN_SIGMA_M, |(received_s, sigma_m)| {
                     sigma_m.hypot(DRIFT_MPS * (time_s - received_s))
                 }),
             };
-            let covariance_m2 = row.covariance(sigma_m, datum).map_err(fault)?;
-            if !row.solution_status.is_empty() && row.solution_status != COMPUTED {
-                read.refused += 1;
-                continue;
-            }
+            let covariance_m2 = row.covariance(sigma_m, datum)?;
             if time_s <= last_s {
                 read.out_of_order += 1;
                 continue;
@@ -126,6 +116,7 @@ impl RecordedFixes {
             if read.fixes.is_empty() {
                 read.start_s = time_s;
             }
+            read.has_decimal_commas |= row.0.has_decimal_comma("latitude");
             let fix = Fix {
                 time: SimTime::from_secs(time_s - read.start_s),
                 place: datum.world(&place).xy(),
@@ -135,74 +126,74 @@ impl RecordedFixes {
                 fix,
                 place,
                 sigma_m,
-                kind: row.position_type,
+                kind: row.kind().to_owned(),
             });
         }
         match read.fixes.is_empty() {
-            true => Err(TableError {
+            true => Err(SheetError::Row {
                 line: 1,
-                what: "holds no fix: columns timestamp, latitude, longitude are needed".to_owned(),
+                what: "no row under the headers is a fix".to_owned(),
+                remedy: format!(
+                    "give rows with timestamp, latitude and longitude, and with {COMPUTED} where there is a solution_status"
+                ),
             }),
             false => Ok(read),
         }
     }
 }
 
-/// Speeds of a table, with times since a start.
-pub fn read_speeds(text: &str, start_s: f64) -> Result<Vec<(SimTime, f64)>, TableError> {
-    rows::<SpeedRow>(text)
-        .map(|row| {
-            let (line, row) = row?;
-            let time_s = seconds(&row.timestamp).map_err(|what| TableError { line, what })?;
-            if !row.speed_mps.is_finite() {
-                let what = format!("speed_mps is {}", row.speed_mps);
-                return Err(TableError { line, what });
-            }
-            Ok((SimTime::from_secs(time_s - start_s), row.speed_mps))
-        })
-        .collect()
+impl RecordedSpeeds {
+    /// Of a text, with times since a start.
+    pub fn read(text: &str, start_s: f64) -> Result<Self, SheetError> {
+        let sheet = Sheet::read(text, &SPEEDS)?;
+        let mut read = Self::default();
+        for row in sheet.rows() {
+            let row = row?;
+            let time = SimTime::from_secs(seconds_of(&row)? - start_s);
+            read.speeds.push((time, row.needed("speed_mps")?));
+            read.has_decimal_commas |= row.has_decimal_comma("speed_mps");
+        }
+        Ok(read)
+    }
 }
 
-/// Rows with their lines.
-fn rows<T: for<'de> Deserialize<'de>>(
-    text: &str,
-) -> impl Iterator<Item = Result<(u64, T), TableError>> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let headers = reader.headers().cloned();
-    let mut record = csv::StringRecord::new();
-    std::iter::from_fn(move || {
-        let line = reader.position().line();
-        let fault = |error: &csv::Error| TableError {
-            line,
-            what: error.to_string(),
-        };
-        let headers = match &headers {
-            Ok(headers) => headers,
-            Err(error) => return Some(Err(fault(error))),
-        };
-        match reader.read_record(&mut record) {
-            Ok(false) => None,
-            Ok(true) => {
-                let line = record.position().map_or(line, csv::Position::line);
-                let row = record.deserialize(Some(headers));
-                Some(row.map(|row| (line, row)).map_err(|e| TableError {
-                    line,
-                    what: e.to_string(),
-                }))
-            }
-            Err(error) => Some(Err(fault(&error))),
-        }
+/// The time of a row.
+fn seconds_of(row: &SheetRow<'_>) -> Result<f64, SheetError> {
+    let text = row.text("timestamp").unwrap_or_default();
+    let time_s = seconds(&row.with_point(text));
+    time_s.ok_or_else(|| {
+        row.wrong(
+            "timestamp",
+            match text {
+                "" => "is empty".to_owned(),
+                text => format!("{text:?} is no time"),
+            },
+            "give seconds, or a date and time like 2022-02-25T09:32:54.400, or take the row out",
+        )
     })
 }
 
-impl FixRow {
-    fn place(&self) -> Result<Geodetic, String> {
-        let (latitude_deg, longitude_deg) = (self.latitude, self.longitude);
+/// A row of a table of fixes.
+struct FixRow<'a>(SheetRow<'a>);
+
+impl FixRow<'_> {
+    /// The receiver calls it a fix, or says nothing.
+    fn is_computed(&self) -> bool {
+        let status = self.0.text("solution_status");
+        status.is_none_or(|status| status == COMPUTED)
+    }
+
+    fn kind(&self) -> &str {
+        self.0.text("position_type").unwrap_or_default()
+    }
+
+    fn place(&self) -> Result<Geodetic, SheetError> {
+        let latitude_deg = self.0.needed("latitude")?;
+        let longitude_deg = self.0.needed("longitude")?;
         if !(latitude_deg.abs() <= 85.0 && longitude_deg.abs() <= 180.0) {
-            return Err(format!(
-                "latitude {latitude_deg}, longitude {longitude_deg}: not on any railway; both are in degrees"
+            return Err(self.0.row_wrong(
+                format!("latitude {latitude_deg}, longitude {longitude_deg}: not on any railway"),
+                "give both in degrees",
             ));
         }
         Ok(Geodetic {
@@ -214,25 +205,26 @@ impl FixRow {
 
     /// None if it is carried on.
     fn kind_sigma_m(&self) -> Option<f64> {
-        if self.position_type.contains(CARRIED_ON) {
+        if self.kind().contains(CARRIED_ON) {
             return None;
         }
-        let kind = SIGMAS_M
-            .iter()
-            .find(|(kind, _)| self.position_type.contains(kind));
+        let kind = SIGMAS_M.iter().find(|(kind, _)| self.kind().contains(kind));
         Some(kind.map_or(UNKNOWN_SIGMA_M, |(_, sigma_m)| *sigma_m))
     }
 
     /// Of world x and y.
-    fn covariance(&self, kind_sigma_m: f64, datum: &Datum) -> Result<Matrix2<f64>, String> {
+    fn covariance(&self, kind_sigma_m: f64, datum: &Datum) -> Result<Matrix2<f64>, SheetError> {
         let sigma_m = kind_sigma_m.hypot(FRAME_SIGMA_M);
-        let north_m = self.sigma_north_m.unwrap_or(sigma_m);
-        let east_m = self.sigma_east_m.unwrap_or(sigma_m);
-        let both_m2 = self.covariance_m2.unwrap_or(0.0);
+        let north_m = self.0.number("sigma_north_m")?.unwrap_or(sigma_m);
+        let east_m = self.0.number("sigma_east_m")?.unwrap_or(sigma_m);
+        let both_m2 = self.0.number("covariance_m2")?.unwrap_or(0.0);
         let of_plane = Matrix2::new(east_m * east_m, both_m2, both_m2, north_m * north_m);
         if !(north_m > 0.0 && east_m > 0.0) || of_plane.cholesky().is_none() {
-            return Err(format!(
-                "sigma_north_m {north_m}, sigma_east_m {east_m}, covariance_m2 {both_m2}: not positive definite"
+            return Err(self.0.row_wrong(
+                format!(
+                    "sigma_north_m {north_m}, sigma_east_m {east_m}, covariance_m2 {both_m2}: not positive definite"
+                ),
+                "give standard deviations over 0, and a covariance below their product",
             ));
         }
         let turn = nalgebra::Rotation2::new(-datum.heading_deg.to_radians());
@@ -242,13 +234,9 @@ impl FixRow {
 }
 
 /// Seconds of a text: a number, or a date and time after ISO 8601, in UTC where it says nothing else.
-fn seconds(text: &str) -> Result<f64, String> {
-    if let Some(seconds) = text.parse::<f64>().ok().filter(|s| s.is_finite()) {
-        return Ok(seconds);
-    }
-    date_time(text).ok_or_else(|| {
-        format!("\"{text}\" is no time: seconds, or a date and time like 2022-02-25T09:32:54.400, is needed")
-    })
+fn seconds(text: &str) -> Option<f64> {
+    let seconds = text.parse::<f64>().ok().filter(|s| s.is_finite());
+    seconds.or_else(|| date_time(text))
 }
 
 /// Since 1970, of YYYY-MM-DDThh:mm:ss, with or without decimals, Z or an offset.
@@ -314,7 +302,7 @@ mod tests {
             "NaN",
             "2022-01-01",
         ] {
-            assert!(seconds(wrong).is_err(), "{wrong}");
+            assert!(seconds(wrong).is_none(), "{wrong}");
         }
     }
 
@@ -373,18 +361,67 @@ mod tests {
 
     #[test]
     fn wrong_rows_are_named_by_their_line() {
+        let said = |text: &str| {
+            let error = RecordedFixes::read(text, &datum()).unwrap_err();
+            error.to_string()
+        };
         for (row, told) in [
-            ("now,50.9,4.5", "line 3: \"now\" is no time"),
+            (
+                "now,50.9,4.5",
+                "line 3, column `timestamp`: \"now\" is no time; give seconds",
+            ),
+            (
+                ",50.9,4.5",
+                "line 3, column `timestamp`: is empty; give seconds",
+            ),
             ("1,4.5,250.9", "line 3: latitude 4.5"),
-            ("1,north,4.5", "line 3: "),
-            ("1,50.9", "line 3: "),
+            (
+                "1,north,4.5",
+                "line 3, column `latitude`: \"north\" is no number",
+            ),
+            (
+                "1,,4.5",
+                "line 3, column `latitude`: is empty or endless; give a number, or take the row out",
+            ),
+            ("1,50.9", "line 3, column `longitude`: is empty"),
+            (
+                "1,50,9,4,5",
+                "line 3: the row has 5 cells, and there are 3 headers",
+            ),
         ] {
-            let text = format!("time,latitude,longitude\n0,50.9,4.5\n{row}\n");
-            let said = RecordedFixes::read(&text, &datum())
-                .unwrap_err()
-                .to_string();
-            assert!(said.starts_with(told), "{row}: {said}");
+            for line_break in ["\n", "\r\n"] {
+                let text = ["time,latitude,longitude", "0,50.9,4.5", row, ""].join(line_break);
+                assert!(said(&text).starts_with(told), "{row}: {}", said(&text));
+            }
         }
-        assert!(RecordedFixes::read("time,latitude,longitude\n", &datum()).is_err());
+        assert!(said("time,latitude,longitude\n").contains("no row under the headers is a fix"));
+        assert!(said("time,latitude\n1,50.9\n").contains("no column `longitude`"));
+        let speeds = |text: &str| RecordedSpeeds::read(text, 0.0).unwrap_err().to_string();
+        let empty = speeds("time;speed_mps\r\n0;1,5\r\n\r\n1;\r\n");
+        assert!(
+            empty.starts_with("line 4, column `speed_mps`: is empty"),
+            "{empty}"
+        );
+    }
+
+    /// Fails where a comma of a number is taken for one between columns, or a row without a fix has to hold a place.
+    #[test]
+    fn tables_with_decimal_commas_are_those_with_points() {
+        let points = "timestamp,latitude,longitude,solution_status,sigma_north_m,sigma_east_m\n\
+            0.5,50.91,4.5,SOL_COMPUTED,1.5,2\n1,,,INSUFFICIENT_OBS,,\n2022-02-25T09:32:54.400,50.9,4.25,,1,1\n";
+        let commas = points.replace(',', ";").replace('.', ",");
+        let [points, commas] =
+            [points, &commas].map(|text| RecordedFixes::read(text, &datum()).unwrap());
+        assert!(commas.has_decimal_commas && !points.has_decimal_commas);
+        assert_eq!((commas.fixes.len(), commas.refused), (2, 1));
+        for (a, b) in points.fixes.iter().zip(&commas.fixes) {
+            assert_eq!(a.fix.time, b.fix.time);
+            assert_eq!(a.fix.place, b.fix.place);
+            assert_eq!(a.fix.covariance_m2, b.fix.covariance_m2);
+        }
+        let speeds = |text| RecordedSpeeds::read(text, 0.0).unwrap();
+        let commas = speeds("time;speed_mps\n0,5;12,25\n");
+        assert!(commas.has_decimal_commas);
+        assert_eq!(commas.speeds, speeds("time,speed_mps\n0.5,12.25\n").speeds);
     }
 }

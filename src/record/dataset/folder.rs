@@ -3,7 +3,7 @@
 
 use super::INPUTS;
 use super::files::{FILES, FOLDERS};
-use crate::record::listing::{LIST, Listing, foreign, is_empty};
+use crate::files::{LIST, Listing, foreign, is_empty};
 use crate::settings::{ReadLimit, read_bytes};
 use serde_json::Value;
 use std::io;

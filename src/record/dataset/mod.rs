@@ -52,7 +52,7 @@ pub use folder::FolderError;
 pub use plan::{FramePlan, LabelKind, LabelKinds, UnknownLabel};
 
 use crate::bus::TrainId;
-use crate::record::listing::Listing;
+use crate::files::Listing;
 use crate::record::parquet::{Column, ParquetTable};
 use crate::record::whole_files::{Result, broken, failed, write_whole};
 use crate::scenario::Scenario;

@@ -195,7 +195,7 @@ impl Template {
         Ok(document)
     }
 
-    /// What a draw changes in the file, its seed among it.
+    /// What is set from the command line, and what a draw changes in the file, its seed among it.
     pub fn overrides(&self, sample: &ScenarioSample) -> Vec<Override> {
         let of = |(name, value): &(String, Value)| {
             let variable = self.settings.variables.get(name);
@@ -206,7 +206,8 @@ impl Template {
             value: Value::Integer(sample.seed as i64),
         };
         let drawn = sample.values.iter().flat_map(of);
-        std::iter::once(seed).chain(drawn).collect()
+        let set = self.set.iter().cloned();
+        set.chain([seed]).chain(drawn).collect()
     }
 
     /// The scenario of a draw, checked.

@@ -8,7 +8,7 @@ use super::tables::Tables;
 use crate::scenario::build::overridden;
 use crate::scenario::parts::read;
 use crate::scenario::{Override, Scenario, ScenarioError, ScenarioFile};
-use crate::settings::{FileError, Problem, read_settings};
+use crate::settings::{FileError, Problem, is_within, read_settings};
 use nalgebra::DMatrix;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,9 @@ pub struct Template {
     /// The file.
     pub path: PathBuf,
     pub(super) text: String,
-    /// As it stands, nothing drawn.
+    /// Changes from the command line, made before anything is drawn.
+    pub set: Vec<Override>,
+    /// As it stands with these changes, nothing drawn.
     pub file: ScenarioFile,
     /// What varies.
     pub settings: StudySettings,
@@ -41,14 +43,19 @@ pub struct Template {
 impl Template {
     /// Reads and checks a file, and the scenario that it is as it stands.
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
-        Self::from_text(path, read(path)?)
+        Self::from_text(path, read(path)?, &[])
     }
 
-    /// As [`Self::load`], of a text already read; `path` is where relative paths count from.
-    pub fn from_text(path: &Path, text: String) -> Result<Self, ScenarioError> {
+    /// As [`Self::load`], of a text already read, with some of its keys set anew; `path` is where relative paths count
+    /// from.
+    pub fn from_text(path: &Path, text: String, set: &[Override]) -> Result<Self, ScenarioError> {
         let wrong = |source| ScenarioError::file(path, &text, source);
-        let own = Scenario::from_text(path, &text, &[]).err();
+        let own = Scenario::from_text(path, &text, set).err();
         let file: ScenarioFile = match read_settings(&text) {
+            Ok(_) if !set.is_empty() => match overridden(path, &text, set) {
+                Ok(file) => file,
+                Err(error) => return Err(own.unwrap_or(error)),
+            },
             Ok(file) => file,
             Err(source) => return Err(own.unwrap_or_else(|| wrong(source))),
         };
@@ -70,15 +77,17 @@ impl Template {
         let tables = Tables::read(&settings, folder, &mut problems);
         let conditions = conditions(&settings, &mut problems);
         let events = events(&settings, &mut problems);
-        check_keys(path, &text, &settings, &tables, &mut problems);
+        check_keys(path, (&text, set), &settings, &tables, &mut problems);
         let coordinates = coordinates(&settings);
         check_size(&settings, coordinates.len(), &mut problems);
         if let Some(error) = ScenarioError::joined(own, path, &text, problems) {
             return Err(error);
         }
+        refuse_drawn(path, set, &settings)?;
         let swept = settings.variables.iter().filter(|(_, v)| v.from.is_swept());
         Ok(Self {
             path: path.to_owned(),
+            set: set.to_vec(),
             groups: groups(&settings, &coordinates),
             swept: swept
                 .map(|(name, v)| (name.clone(), v.from.swept()))
@@ -143,6 +152,7 @@ impl Template {
             let mut listed = self.listed_changes(variable);
             listed.retain(|changes| changes.iter().any(|c| may_name_file(&c.value)));
             for changes in listed {
+                let changes = [self.set.clone(), changes].concat();
                 if let Ok(file) = overridden(&self.path, &self.text, &changes) {
                     add(file);
                 }
@@ -251,13 +261,53 @@ fn check_size(settings: &StudySettings, coordinates: usize, problems: &mut Vec<P
     }
 }
 
+/// Fails where a run's draw would set anew what is set from the command line.
+fn refuse_drawn(
+    path: &Path,
+    set: &[Override],
+    settings: &StudySettings,
+) -> Result<(), ScenarioError> {
+    let mut problems = Vec::new();
+    for change in set {
+        let overlaps = |key: &str| is_within(key, &change.key) || is_within(&change.key, key);
+        let drawn_by = settings.variables.iter().find(|(_, v)| {
+            let cases = match &v.from {
+                Distribution::Cases(cases) => cases.as_slice(),
+                _ => &[],
+            };
+            let of_cases = cases.iter().flat_map(CaseSettings::overrides);
+            v.keys.iter().any(|key| overlaps(key)) || of_cases.into_iter().any(|c| overlaps(&c.key))
+        });
+        let (what, remedy) = match drawn_by {
+            Some((name, _)) => (
+                format!("is drawn by the study's variable `{name}`"),
+                format!("set another key, or the variable: study.variables.{name}.from={{ ... }}"),
+            ),
+            None if change.key == "seed" => (
+                "is drawn for each run".to_owned(),
+                "set study.seed".to_owned(),
+            ),
+            None => continue,
+        };
+        problems.push(Problem::new(change.key.clone(), what, remedy));
+    }
+    match problems.is_empty() {
+        true => Ok(()),
+        false => Err(ScenarioError::Overridden {
+            path: path.to_owned(),
+            overrides: set.to_vec(),
+            source: FileError::Problems(problems),
+        }),
+    }
+}
+
 /// For each key that is set the whole file is read: so many bytes take some seconds.
 const MOST_BYTES_SET: usize = 32 << 20;
 
 /// Every key that a variable sets must be there, and take a value of its kind.
 fn check_keys(
     path: &Path,
-    text: &str,
+    (text, set): (&str, &[Override]),
     settings: &StudySettings,
     tables: &Tables,
     problems: &mut Vec<Problem>,
@@ -294,7 +344,8 @@ fn check_keys(
             _ => Vec::new(),
         };
         for change in tried.chain(of_cases).flatten() {
-            if let Err(error) = overridden(path, text, std::slice::from_ref(&change)) {
+            let changes = [set, std::slice::from_ref(&change)].concat();
+            if let Err(error) = overridden(path, text, &changes) {
                 let what = match error {
                     ScenarioError::Overridden { source, .. } => source.to_string(),
                     other => other.to_string(),

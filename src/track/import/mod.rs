@@ -36,12 +36,14 @@ mod table;
 
 pub use crs::{Crs, UnknownCrs};
 pub use junction::JunctionKind;
-pub use laying::{LaidMap, LaidTrack, LayingError, LayingOptions};
+pub use laying::{InTunnel, LaidMap, LaidTrack, LayingError, LayingOptions};
 pub use map::{
     AlongElement, ImportCount, ImportReport, ImportedMap, LeftOut, MapBalise, MapSignal, MapSpeed,
     MapStep, MapSwitch, PlanCheck,
 };
 pub use osm::{AroundPlace, OsmError, OsmImport};
+#[cfg(feature = "cli")]
+pub(crate) use table::{Sheet, SheetColumn, SheetRow};
 pub use table::{SheetError, TableFault, TableImport, TableOptions};
 
 /// The number in a key of a file such as `switches[3].name`, if it is one of that table.

@@ -4,10 +4,11 @@ mod recorded;
 mod recorded_maps;
 mod variants;
 
-use crate::program::{folder, printed, program, succeeds};
+use crate::program::{content, folder, printed, program, refuses, says, succeeds};
 use metrotwin::track::{TrackPoint, Tunnel};
 use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 
 /// Fixes of a train that runs 7 m/s along tracks of the terminus, each from a chainage to another, to the decimetre.
 fn fixes(runs: &[(&str, f64, f64)]) -> String {
@@ -77,6 +78,84 @@ fn a_train_is_located_in_the_depot() {
         map["features"].as_array().unwrap().len(),
         table.lines().count() - 1
     );
+}
+
+/// Fails where a table with decimal commas is located otherwise than the same with points, or it is not said.
+#[test]
+fn a_table_with_decimal_commas_is_taken() {
+    let out = folder("decimal_commas");
+    let points = fixes(&[("lead", 500.0, 600.0)]);
+    let commas = points.replace(',', ";").replace('.', ",");
+    let located = [("points", points), ("commas", commas)].map(|(name, table)| {
+        let gnss = out.join(name).with_extension("csv");
+        fs::write(&gnss, table).unwrap();
+        let [gnss, results] = [gnss, out.join(name)].map(|path| path.display().to_string());
+        let args = [
+            "locate",
+            "--network",
+            "tunnels/terminus.toml",
+            "--gnss",
+            &gnss,
+            "--out",
+            &results,
+        ];
+        let run = program(args).output().unwrap();
+        succeeds(&run);
+        let is_said = printed(&run).contains("commas.csv were taken for decimal commas");
+        assert_eq!(is_said, name == "commas", "{}", printed(&run));
+        fs::read_to_string(format!("{results}/tracks.csv")).unwrap()
+    });
+    assert_eq!(located[0], located[1]);
+}
+
+/// Fails where a file of the results is not listed, a file of others is written over, or results cannot be written
+/// again.
+#[test]
+fn results_are_listed_and_no_file_of_others_is_lost() {
+    let out = folder("listed");
+    let gnss = out.join("fixes.csv");
+    fs::write(&gnss, fixes(&[("lead", 500.0, 550.0)])).unwrap();
+    let locate = |results: &Path| {
+        let [gnss, results] = [&gnss, results].map(|path| path.display().to_string());
+        let args = [
+            "--network",
+            "tunnels/terminus.toml",
+            "--gnss",
+            &gnss,
+            "--out",
+            &results,
+        ];
+        program(["locate"].iter().chain(&args)).output().unwrap()
+    };
+    let results = out.join("results");
+    for name in ["tracks.csv", "summary.json", "files.txt"] {
+        fs::create_dir(&results).unwrap();
+        fs::write(results.join(name), "mine").unwrap();
+        let run = locate(&results);
+        refuses(
+            &run,
+            "is there already, and this command has not written it",
+        );
+        says(&run, name);
+        let left = content(&results);
+        assert!(left.len() == 1 && left[name] == b"mine", "{left:?}");
+        fs::remove_dir_all(&results).unwrap();
+    }
+    fs::create_dir(&results).unwrap();
+    fs::write(results.join("notes.txt"), "mine").unwrap();
+    for _ in 0..2 {
+        succeeds(&locate(&results));
+        let written = content(&results);
+        let list = String::from_utf8(written["files.txt"].clone()).unwrap();
+        let mut listed: Vec<&str> = list
+            .lines()
+            .skip(1)
+            .chain(["files.txt", "notes.txt"])
+            .collect();
+        listed.sort_unstable();
+        assert!(written.keys().eq(listed), "{list}");
+        assert_eq!(written["notes.txt"], b"mine");
+    }
 }
 
 /// Provokes: wrong input that is taken, or refused without its line and a remedy.

@@ -1,6 +1,6 @@
 //! How a map is laid, and what comes of it.
 
-use crate::track::file::TunnelFile;
+use crate::track::file::{SectionEntry, SectionShape, TunnelFile};
 use crate::track::import::LeftOut;
 
 /// How a map is laid.
@@ -23,6 +23,45 @@ pub struct LaidMap {
     pub tracks: Vec<LaidTrack>,
     /// What of the map is not in the file, and why.
     pub left_out: Vec<LeftOut>,
+}
+
+/// What of a file lies in tunnels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InTunnel {
+    /// Length of tracks, metres.
+    pub length_m: f64,
+    /// Switches whose toe is there.
+    pub switches: usize,
+}
+
+impl LaidMap {
+    /// What of it lies in tunnels, by the sections of its tracks.
+    pub fn in_tunnel(&self) -> InTunnel {
+        let tracks = self.file.track.iter().zip(&self.tracks);
+        let mut found = InTunnel::default();
+        for (entry, laid) in tracks {
+            let ends_m = entry.sections.iter().skip(1).map(|next| next.from_m);
+            let ends_m = ends_m.chain([laid.length_m]);
+            let covered = entry.sections.iter().zip(ends_m);
+            let covered = covered.filter(|(section, _)| is_tunnel(section));
+            found.length_m += covered.map(|(s, to_m)| to_m - s.from_m).sum::<f64>();
+            let ends = [
+                (&entry.from, entry.sections.first()),
+                (&entry.to, entry.sections.last()),
+            ];
+            let in_tunnel = ends.into_iter().filter(|(word, section)| {
+                let is_toe = word.as_ref().is_some_and(|word| word.ends_with(".toe"));
+                is_toe && section.is_some_and(is_tunnel)
+            });
+            found.switches += in_tunnel.count();
+        }
+        found
+    }
+}
+
+/// Maps are laid in the open and in tunnels alone.
+fn is_tunnel(section: &SectionEntry) -> bool {
+    !matches!(section.shape, SectionShape::Open { .. })
 }
 
 /// How near a track is to the points of the map.

@@ -32,7 +32,7 @@ use crate::track::geodesy::Datum;
 use crate::track::network::TrackEnd;
 use crate::track::{Direction, TrackId};
 use joining::{Joined, Meeting, joined};
-pub use laid::{LaidMap, LaidTrack, LayingError, LayingOptions};
+pub use laid::{InTunnel, LaidMap, LaidTrack, LayingError, LayingOptions};
 use plans::WrittenPlan;
 pub(super) use plans::rounded;
 use poses::{BentPose, poses};

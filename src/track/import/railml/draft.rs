@@ -4,7 +4,7 @@ use super::place::KnownPlace;
 use super::xml::Item;
 use crate::track::Direction;
 use crate::track::geodesy::Datum;
-use crate::track::import::{AlongElement, PlanCheck};
+use crate::track::import::{AlongElement, MapStep, PlanCheck};
 use nalgebra::Point2;
 
 /// A file's tracks.
@@ -84,6 +84,12 @@ impl DraftTrack<'_> {
             from.copied().unwrap_or(0.0),
             to.copied().unwrap_or(self.length_m),
         ]
+    }
+
+    /// Steps of its curvature, none where none are stated.
+    pub(super) fn curvatures(&self) -> Option<&[MapStep]> {
+        let steps = self.along.curvatures_per_m.as_slice();
+        (!steps.is_empty()).then_some(steps)
     }
 
     pub(super) fn pieces(&self) -> usize {

@@ -57,7 +57,8 @@
 //! **Refused**, with line, element, id, and what would be right: other XML and other versions, ids that are not unique,
 //! connections and relations that name nothing or not each other, switches with one leg or of which nothing tells which
 //! leg diverges, places outside their track, numbers that no railway has, collections that contain themselves,
-//! coordinates without a system, in one that is not read, or the wrong way round.
+//! coordinates without a system, in one that is not read, or the wrong way round (see `swapped.rs`), and tracks that are
+//! stated to be of another length than their coordinates are apart.
 //!
 //! Source: railML 2.2 to 2.5 and 3.1 to 3.3, as documented at wiki2.railml.org and wiki3.railml.org. Of 3.x all versions
 //! are read alike. Versions 1.x are refused.
@@ -75,6 +76,7 @@ mod place;
 mod plan;
 mod report;
 mod stated;
+mod swapped;
 #[cfg(test)]
 #[allow(
     clippy::unwrap_used,

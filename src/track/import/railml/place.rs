@@ -2,7 +2,8 @@
 
 use super::xml::{Item, short};
 use super::{Crs, RailMlError, RailMlOptions};
-use crate::track::geodesy::Geodetic;
+use crate::track::geodesy::{Datum, Geodetic};
+use nalgebra::Point2;
 
 /// A place along a track of which coordinates are stated.
 #[derive(Clone)]
@@ -18,6 +19,13 @@ pub(super) struct KnownPlace<'a> {
     pub(super) item: Item<'a>,
     /// What is there.
     pub(super) what: String,
+}
+
+impl KnownPlace<'_> {
+    /// In the plane of a datum.
+    pub(super) fn in_plane(&self, datum: &Datum) -> Point2<f64> {
+        datum.world(&self.place).xy()
+    }
 }
 
 /// Two coordinates as written, and the system that the file names for them.

@@ -7,15 +7,14 @@ use super::draft::{CutEnd, Draft, DraftPlan, DraftTrack, ElementShape};
 use super::line::{Line, straight};
 use super::place::KnownPlace;
 use super::report::Fates;
-use super::stated::SAME_M;
+use super::stated::{SAME_M, SAME_POINT_M};
+use super::swapped::refuse_swapped;
 use super::through::ThroughPlaces;
-use crate::track::geodesy::{Datum, Geodetic};
+use crate::track::geodesy::Datum;
 use crate::track::import::{MapStep, PlanCheck};
-use nalgebra::{Point2, Vector2};
+use nalgebra::Vector2;
 use std::f64::consts::PI;
 
-/// Coordinates of one place may be so far apart, metres.
-const SAME_POINT_M: f64 = 0.5;
 /// Turns of headings that are no reading error, radians, all together.
 const LEAST_TURN: f64 = 0.02;
 
@@ -28,7 +27,7 @@ pub(super) fn draw(draft: &Draft<'_>, fates: &mut Fates) -> Result<DraftPlan, Ra
         place: first.place,
         heading_deg: 0.0,
     };
-    refuse_swapped(draft, &datum)?;
+    refuse_swapped(&draft.tracks, &datum)?;
     let spots = spots(draft, &datum, fates);
     let stated = draft.turns_are_known.then_some(1.0);
     let turn = stated.or_else(|| turn(draft, &spots));
@@ -38,23 +37,13 @@ pub(super) fn draw(draft: &Draft<'_>, fates: &mut Fates) -> Result<DraftPlan, Ra
         spots,
         lines: draft.tracks.iter().map(|_| None).collect(),
     };
-    drawn.draw_all()?;
+    drawn.draw_all(&datum)?;
     Ok(DraftPlan {
         datum: Some(datum),
         shapes: drawn.shapes(),
         checks: drawn.checks(&datum, fates),
         turn,
     })
-}
-
-fn world(datum: &Datum, place: &Geodetic) -> Point2<f64> {
-    datum.world(place).xy()
-}
-
-/// Steps of curvature, none where none are stated.
-fn stated<'t>(track: &'t DraftTrack<'_>) -> Option<&'t [MapStep]> {
-    let steps = track.along.curvatures_per_m.as_slice();
-    (!steps.is_empty()).then_some(steps)
 }
 
 /// Multiplied by 1 or -1, as positive curvature turns to the left or to the right.
@@ -66,56 +55,13 @@ fn turned_by(turn: f64, steps: &[MapStep]) -> Vec<MapStep> {
     turned.collect()
 }
 
-/// Fails where distances are as stated only with the coordinates the other way round.
-fn refuse_swapped(draft: &Draft<'_>, datum: &Datum) -> Result<(), RailMlError> {
-    let (mut pairs, mut as_read, mut the_other_way) = (0, 0, 0);
-    let mut swapped_datum = None;
-    let mut first = None;
-    for track in &draft.tracks {
-        let mut places: Vec<_> = track.places.iter().collect();
-        places.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
-        for pair in places.windows(2) {
-            let [a, b] = pair else { continue };
-            let (Some(swapped_a), Some(swapped_b)) = (a.swapped, b.swapped) else {
-                continue;
-            };
-            if b.at_m - a.at_m < SAME_POINT_M {
-                continue;
-            }
-            let other = *swapped_datum.get_or_insert(Datum {
-                place: swapped_a,
-                heading_deg: 0.0,
-            });
-            let agrees = |datum: &Datum, [from, to]: [&Geodetic; 2]| {
-                let spot = |at_m, place| TrackSpot {
-                    at_m,
-                    place: world(datum, place),
-                    weight: 1,
-                    source: 0,
-                };
-                agree([&spot(a.at_m, from), &spot(b.at_m, to)], None).is_some()
-            };
-            first.get_or_insert(*a);
-            pairs += 1;
-            as_read += usize::from(agrees(datum, [&a.place, &b.place]));
-            the_other_way += usize::from(agrees(&other, [&swapped_a, &swapped_b]));
-        }
-    }
-    match first {
-        Some(place) if 2 * as_read < pairs && 2 * as_read < the_other_way => Err(place.item.fault(format!(
-            "{as_read} of {pairs} distances between coordinates are as long as the track between them, and {the_other_way} with the coordinates the other way round: are they swapped?"
-        ))),
-        _ => Ok(()),
-    }
-}
-
 /// The places that each track runs through, and those of its neighbours where it is joined to them, as far as they
 /// agree.
 fn spots(draft: &Draft<'_>, datum: &Datum, fates: &mut Fates) -> Vec<Vec<TrackSpot>> {
     let own = |(source, track): (usize, &DraftTrack<'_>)| -> Vec<TrackSpot> {
         let spot = |known: &KnownPlace<'_>| TrackSpot {
             at_m: known.at_m,
-            place: world(datum, &known.place),
+            place: known.in_plane(datum),
             weight: known.weight,
             source,
         };
@@ -141,7 +87,7 @@ fn spots(draft: &Draft<'_>, datum: &Datum, fates: &mut Fates) -> Vec<Vec<TrackSp
     }
     for ((spots, track), own) in all.iter_mut().zip(&draft.tracks).zip(&own) {
         spots.sort_by(|a, b| a.at_m.total_cmp(&b.at_m).then(a.source.cmp(&b.source)));
-        let course = stated(track).map(|steps| TrackCourse::new(0.0, steps));
+        let course = track.curvatures().map(|steps| TrackCourse::new(0.0, steps));
         let chord_m =
             |[a, b]: [&TrackSpot; 2]| course.as_ref().map(|c| c.chord([a.at_m, b.at_m]).norm());
         let chosen = agreeing(spots, |pair| agree(pair, chord_m(pair)));
@@ -169,11 +115,30 @@ fn spots(draft: &Draft<'_>, datum: &Datum, fates: &mut Fates) -> Vec<Vec<TrackSp
     all
 }
 
+/// Why a track is not drawn: its places contradict each other, or there are none.
+fn not_drawn(track: &DraftTrack<'_>, datum: &Datum) -> RailMlError {
+    let mut places: Vec<&KnownPlace<'_>> = track.places.iter().collect();
+    places.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
+    match (places.first(), places.last()) {
+        (Some(a), Some(b)) if b.at_m - a.at_m > SAME_M => b.item.fault(format!(
+            "its coordinates are {:.1} m from those of {} (line {}), and the track between them is stated to be {:.1} m long: \
+             correct the coordinates, or the stated length (`pos` in railML 2, `length` in railML 3)",
+            (b.in_plane(datum) - a.in_plane(datum)).norm(),
+            a.what,
+            a.item.line(),
+            b.at_m - a.at_m
+        )),
+        _ => track.item.fault(
+            "nothing says where it lies: other tracks have coordinates, so it needs those of its begin or end, or a connection to a track that has them",
+        ),
+    }
+}
+
 /// Which way positive curvature turns, by how evenly headings then run through the known places of all tracks.
 fn turn(draft: &Draft<'_>, spots: &[Vec<TrackSpot>]) -> Option<f64> {
     let uneven = |turn: f64| -> f64 {
         let of_tracks = draft.tracks.iter().zip(spots).map(|(track, spots)| {
-            let steps = stated(track).unwrap_or_default();
+            let steps = track.curvatures().unwrap_or_default();
             let turns = TrackCourse::new(0.0, &turned_by(turn, steps)).turns(spots);
             turns
                 .windows(2)
@@ -201,7 +166,7 @@ struct DrawnTracks<'d, 'a> {
 impl DrawnTracks<'_, '_> {
     /// First tracks of which places are known, those of which most are first; then those that are joined to one that is
     /// drawn, from there on.
-    fn draw_all(&mut self) -> Result<(), RailMlError> {
+    fn draw_all(&mut self, datum: &Datum) -> Result<(), RailMlError> {
         let mut joined: Vec<Vec<(CutEnd, CutEnd)>> =
             self.lines.iter().map(|_| Vec::new()).collect();
         for (a, b) in &self.draft.joints {
@@ -234,9 +199,7 @@ impl DrawnTracks<'_, '_> {
             .zip(&self.draft.tracks)
             .find(|(line, _)| line.is_none());
         match missing {
-            Some((_, track)) => Err(track.item.fault(
-                "nothing says where it lies: other tracks have coordinates, so it needs those of its begin or end, or a connection to a track that has them",
-            )),
+            Some((_, track)) => Err(not_drawn(track, datum)),
             None => Ok(()),
         }
     }
@@ -277,7 +240,7 @@ impl DrawnTracks<'_, '_> {
                 });
             }
         }
-        let line = match (self.turn, stated(track)) {
+        let line = match (self.turn, track.curvatures()) {
             (Some(turn), Some(steps)) => {
                 let steps = turned_by(turn, steps);
                 ThroughPlaces::new(&steps, &spots, &headings).map(Line::Curved)
@@ -314,7 +277,7 @@ impl DrawnTracks<'_, '_> {
             for (known, line) in track.beside.iter().zip(line.iter().cycle()) {
                 let heading = line.heading(known.at_m);
                 let forward = Vector2::new(heading.cos(), heading.sin());
-                let to = world(datum, &known.place) - line.at(known.at_m);
+                let to = known.in_plane(datum) - line.at(known.at_m);
                 fates.take(known.item);
                 let check = PlanCheck {
                     line: known.item.line(),

@@ -11,6 +11,8 @@ pub(super) const LEAST_RADIUS_M: f64 = 10.0;
 pub(super) const MOST_GRADE_PERMILLE: f64 = 300.0;
 /// Places along a track are one to within this, metres.
 pub(super) const SAME_M: f64 = 0.01;
+/// Coordinates of one place may be so far apart, metres.
+pub(super) const SAME_POINT_M: f64 = 0.5;
 /// A place may be stated to lie so far beyond its track's end, metres: places are rounded.
 const BEYOND_M: f64 = 1.0;
 /// `pos` of a switch may be rounded; its mileage tells the rest if it differs by less than this, metres.

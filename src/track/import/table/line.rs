@@ -10,6 +10,14 @@ use crate::track::section::Side;
 
 /// A length and the distance of chainages may differ by so much.
 pub(super) const SAME_M: f64 = 0.005;
+/// Columns of the cant, and millimetres in the unit of each.
+const CANT_MM: [(&str, f64); 2] = [("cant_mm", 1.0), ("cant_m", 1000.0)];
+/// Columns of the grade, and permille in the unit of each.
+const GRADE_PERMILLE: [(&str, f64); 3] = [
+    ("grade_permille", 1.0),
+    ("grade_percent", 10.0),
+    ("grade_ratio", 1000.0),
+];
 /// Rows that a table may have.
 const MOST_ROWS: usize = 20_000;
 
@@ -22,8 +30,8 @@ pub(super) struct TableLine {
 }
 
 impl TableLine {
-    pub fn of(sheet: &Sheet) -> Result<Self, SheetError> {
-        let rows: Vec<SheetRow<'_>> = sheet.rows().collect();
+    pub fn of(sheet: &Sheet<'_>) -> Result<Self, SheetError> {
+        let rows: Vec<SheetRow<'_>> = sheet.rows().collect::<Result<_, _>>()?;
         let Some((first, last)) = rows.first().zip(rows.last()) else {
             let what = "there is no row under the headers".to_owned();
             return Err(SheetError::NotATable { line: 1, what });
@@ -107,10 +115,11 @@ impl TableLine {
 
     pub fn lamps(
         &self,
-        sheet: &Sheet,
+        sheet: &Sheet<'_>,
         line_number: u8,
     ) -> Result<Vec<(usize, LampEntry)>, SheetError> {
         let lamps = sheet.rows().map(|row| {
+            let row = row?;
             let stated_m = row.needed("chainage_m")?;
             let chainage_m = rounded(stated_m - self.begin_m, 6);
             if !(0.0..=self.length_m).contains(&chainage_m) {
@@ -158,6 +167,42 @@ impl TableLine {
     }
 }
 
+impl SheetRow<'_> {
+    /// What one of several columns says, each with the factor from its unit; none where all are empty.
+    fn in_units(&self, columns: &[(&'static str, f64)]) -> Result<Option<f64>, SheetError> {
+        let mut found: Option<(&str, f64)> = None;
+        for (column, factor) in columns {
+            let Some(value) = self.number_or_ratio(column)? else {
+                continue;
+            };
+            if let Some((other, _)) = found {
+                let what = format!("`{other}` says it too");
+                return Err(self.wrong(column, what, "leave one of the two columns out"));
+            }
+            found = Some((column, rounded(factor * value, 6)));
+        }
+        Ok(found.map(|(_, value)| value))
+    }
+
+    /// A number, or in a column of ratios one to another, as `1:40`.
+    fn number_or_ratio(&self, column: &'static str) -> Result<Option<f64>, SheetError> {
+        let text = self.text(column).filter(|_| column.ends_with("_ratio"));
+        let Some((one, other)) = text.and_then(|text| text.split_once(':')) else {
+            return self.number(column);
+        };
+        let number = |text: &str| self.with_point(text.trim()).parse::<f64>().ok();
+        let ratio = number(one).zip(number(other)).map(|(a, b)| a / b);
+        match ratio.filter(|ratio| ratio.is_finite()) {
+            Some(ratio) => Ok(Some(ratio)),
+            None => Err(self.wrong(
+                column,
+                format!("{one:?} to {other:?} is no ratio"),
+                "write 1:40, -1:40 where the line falls, and 0 where it is level",
+            )),
+        }
+    }
+}
+
 /// A row with nothing but the chainage of the end.
 fn is_end(row: &SheetRow<'_>) -> bool {
     let element = row.text("element").map(str::to_lowercase);
@@ -166,7 +211,7 @@ fn is_end(row: &SheetRow<'_>) -> bool {
 
 /// The grade that begins at a row.
 fn grade(row: &SheetRow<'_>, from_m: f64) -> Result<Option<GradeEntry>, SheetError> {
-    let Some(grade_permille) = row.number("grade_permille")? else {
+    let Some(grade_permille) = row.in_units(&GRADE_PERMILLE)? else {
         return Ok(None);
     };
     let radius_m = row.number("vertical_radius_m")?;
@@ -177,7 +222,7 @@ fn grade(row: &SheetRow<'_>, from_m: f64) -> Result<Option<GradeEntry>, SheetErr
     }))
 }
 
-fn shape(row: &SheetRow<'_>, sheet: &Sheet) -> Result<PlanShape, SheetError> {
+fn shape(row: &SheetRow<'_>, sheet: &Sheet<'_>) -> Result<PlanShape, SheetError> {
     let radius_m = row.number("radius_m")?.unwrap_or(0.0);
     let is_straight = radius_m.abs() < f64::MIN_POSITIVE || radius_m.is_infinite();
     let word = row.text("element").map(str::to_lowercase);
@@ -232,7 +277,7 @@ fn shape(row: &SheetRow<'_>, sheet: &Sheet) -> Result<PlanShape, SheetError> {
     Ok(PlanShape::Arc {
         radius_m: radius_m.abs(),
         turn,
-        cant_mm: row.number("cant_mm")?.unwrap_or(0.0),
+        cant_mm: row.in_units(&CANT_MM)?.unwrap_or(0.0),
     })
 }
 

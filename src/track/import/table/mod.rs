@@ -10,46 +10,39 @@ mod sheet;
 mod tests;
 
 pub use sheet::SheetError;
+pub(crate) use sheet::{Sheet, SheetColumn, SheetRow};
 
 use crate::track::check::check;
-use crate::track::file::{DatumEntry, Increment, StartEntry, StatedChainageEntry, TunnelFile};
+use crate::track::file::{
+    DatumEntry, Increment, SectionEntry, SectionShape, StartEntry, StatedChainageEntry, TunnelFile,
+};
 use crate::track::geodesy::Geodetic;
 use line::{SAME_M, TableLine};
-use sheet::{Sheet, SheetColumn};
 
 /// Columns of the table of the alignment.
-const ALIGNMENT: [SheetColumn; 8] = [
-    column("chainage_m", &["chainage", "station", "station_m"], true),
-    column("radius_m", &["radius", "r"], true),
-    column("turn", &["hand", "direction"], false),
-    column("element", &["type", "kind"], false),
-    column("length_m", &["length", "l"], false),
-    column("cant_mm", &["cant"], false),
-    column("grade_permille", &["grade", "gradient_permille"], false),
-    column("vertical_radius_m", &["vertical_radius"], false),
+const ALIGNMENT: [SheetColumn; 11] = [
+    SheetColumn::needed("chainage_m", &["chainage", "station", "station_m"]),
+    SheetColumn::needed("radius_m", &["radius", "r"]),
+    SheetColumn::optional("turn", &["hand", "direction"]),
+    SheetColumn::optional("element", &["type", "kind"]),
+    SheetColumn::optional("length_m", &["length", "l"]),
+    SheetColumn::optional("cant_mm", &["cant"]),
+    SheetColumn::optional("cant_m", &[]),
+    SheetColumn::optional("grade_permille", &["grade", "gradient_permille"]),
+    SheetColumn::optional("grade_percent", &["gradient_percent"]),
+    SheetColumn::optional("grade_ratio", &["gradient_ratio"]),
+    SheetColumn::optional("vertical_radius_m", &["vertical_radius"]),
 ];
 
 /// Columns of the table of lamps.
 const LAMPS: [SheetColumn; 6] = [
-    column("chainage_m", &["chainage", "station", "station_m"], true),
-    column("number", &["uid", "lamp"], true),
-    column("lateral_m", &["lateral"], false),
-    column("height_m", &["height"], false),
-    column("aim_yaw_deg", &[], false),
-    column("power_w", &["power"], false),
+    SheetColumn::needed("chainage_m", &["chainage", "station", "station_m"]),
+    SheetColumn::needed("number", &["uid", "lamp"]),
+    SheetColumn::optional("lateral_m", &["lateral"]),
+    SheetColumn::optional("height_m", &["height"]),
+    SheetColumn::optional("aim_yaw_deg", &[]),
+    SheetColumn::optional("power_w", &["power"]),
 ];
-
-const fn column(
-    name: &'static str,
-    others: &'static [&'static str],
-    is_needed: bool,
-) -> SheetColumn {
-    SheetColumn {
-        name,
-        others,
-        is_needed,
-    }
-}
 
 /// Where a line of a table lies, and what it is called.
 #[derive(Clone, Debug)]
@@ -62,6 +55,8 @@ pub struct TableOptions {
     pub datum: Option<Geodetic>,
     /// Its direction there, degrees from east towards north.
     pub heading_deg: f64,
+    /// It lies in the open, not in a circular tunnel.
+    pub is_open: bool,
 }
 
 /// A line of tables.
@@ -111,6 +106,13 @@ impl TableImport {
                 increment: Increment::Increasing,
                 equations: Vec::new(),
             });
+        }
+        if options.is_open {
+            file.sections = vec![SectionEntry {
+                from_m: 0.0,
+                to_m: None,
+                shape: SectionShape::Open { width_m: None },
+            }];
         }
         file.plan = line.plan.iter().map(|(_, entry)| entry.clone()).collect();
         file.grades = line.grades.iter().map(|(_, entry)| entry.clone()).collect();

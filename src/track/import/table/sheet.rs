@@ -1,13 +1,32 @@
 //! A table as offices write it: comma, semicolon or tab between columns; decimal point or comma; headers in any case and
 //! order.
 
+use std::borrow::Cow;
+
 /// A column that is looked for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SheetColumn {
+pub(crate) struct SheetColumn {
     pub name: &'static str,
     /// Other headers that mean the same.
     pub others: &'static [&'static str],
     pub is_needed: bool,
+}
+
+impl SheetColumn {
+    pub const fn needed(name: &'static str, others: &'static [&'static str]) -> Self {
+        Self {
+            name,
+            others,
+            is_needed: true,
+        }
+    }
+
+    pub const fn optional(name: &'static str, others: &'static [&'static str]) -> Self {
+        Self {
+            is_needed: false,
+            ..Self::needed(name, others)
+        }
+    }
 }
 
 /// What is wrong with a table.
@@ -68,67 +87,125 @@ struct SheetHead {
     unknown: Vec<String>,
 }
 
-/// A table that was read.
-pub(super) struct Sheet {
+/// A table whose headers are read.
+pub(crate) struct Sheet<'t> {
+    text: &'t str,
+    separator: u8,
     columns: Vec<(&'static str, usize)>,
+    headers: usize,
     /// Headers that mean nothing here.
     pub unknown: Vec<String>,
-    rows: Vec<(usize, csv::StringRecord)>,
-    has_decimal_comma: bool,
 }
 
-impl Sheet {
-    pub fn read(text: &str, wanted: &[SheetColumn]) -> Result<Self, SheetError> {
+impl<'t> Sheet<'t> {
+    pub fn read(text: &'t str, wanted: &[SheetColumn]) -> Result<Self, SheetError> {
         let text = text.trim_start_matches('\u{feff}');
-        let first = text.lines().next().unwrap_or_default();
-        let separators = [b';', b'\t', b','];
+        let mut first = text.lines().filter(|line| !line.trim().is_empty());
+        let first = first.next().unwrap_or_default();
         let count = |separator: &u8| first.bytes().filter(|byte| byte == separator).count();
-        let separator = separators
-            .into_iter()
-            .max_by_key(|s| (count(s), *s != b','))
-            .unwrap_or(b',');
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(separator)
-            .has_headers(false)
-            .flexible(true)
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        let mut rows = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(|error| SheetError::NotATable {
-                line: error.position().map_or(1, |at| at.line() as usize),
-                what: error.to_string(),
-            })?;
-            let line = record.position().map_or(1, |at| at.line() as usize);
-            // Rows that a spreadsheet leaves empty.
-            if record.iter().any(|cell| !cell.is_empty()) {
-                rows.push((line, record));
-            }
-        }
-        if rows.is_empty() {
+        let separators = [b';', b'\t', b','].into_iter();
+        let separator = separators.max_by_key(|s| (count(s), *s != b','));
+        let separator = separator.unwrap_or(b',');
+        let Some((_, headers)) = SheetRecords::new(text, separator).next().transpose()? else {
             let what = "the file is empty".to_owned();
             return Err(SheetError::NotATable { line: 1, what });
-        }
-        let (_, headers) = rows.remove(0);
+        };
         let SheetHead { columns, unknown } = head(&headers, wanted)?;
         Ok(Self {
+            text,
+            separator,
             columns,
+            headers: headers.len(),
             unknown,
-            rows,
-            has_decimal_comma: separator != b',',
         })
     }
 
-    pub fn rows(&self) -> impl ExactSizeIterator<Item = SheetRow<'_>> {
-        self.rows.iter().map(|(line, record)| SheetRow {
-            sheet: self,
-            line: *line,
-            record,
-        })
+    /// Row by row, without those that a spreadsheet leaves empty.
+    pub fn rows(&self) -> impl Iterator<Item = Result<SheetRow<'_>, SheetError>> {
+        SheetRecords::new(self.text, self.separator)
+            .skip(1)
+            .map(|record| {
+                let (line, record) = record?;
+                let row = SheetRow {
+                    sheet: self,
+                    line,
+                    record,
+                };
+                row.refuse_more_cells_than_headers()?;
+                Ok(row)
+            })
     }
 
     pub fn has(&self, column: &str) -> bool {
         self.columns.iter().any(|(name, _)| *name == column)
+    }
+
+    /// Numbers may have a decimal comma: it does not stand between columns.
+    fn takes_decimal_commas(&self) -> bool {
+        self.separator != b','
+    }
+}
+
+/// Records that are not empty, each with its line as an editor counts it.
+struct SheetRecords<'t> {
+    text: &'t [u8],
+    records: csv::StringRecordsIntoIter<&'t [u8]>,
+    /// A place in the text, and its line.
+    reached: (usize, usize),
+}
+
+impl<'t> SheetRecords<'t> {
+    fn new(text: &'t str, separator: u8) -> Self {
+        let text = text.as_bytes();
+        let mut reader = csv::ReaderBuilder::new();
+        let reader = reader
+            .delimiter(separator)
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All);
+        Self {
+            text,
+            records: reader.from_reader(text).into_records(),
+            reached: (0, 1),
+        }
+    }
+
+    /// The parser takes a record to begin where the one before has ended: at the rest of its line break, or at empty
+    /// lines.
+    fn line_of(&mut self, position: Option<&csv::Position>) -> usize {
+        let (from, line) = self.reached;
+        let rest = self.text.get(from..).unwrap_or_default();
+        let skipped = position.map_or(0, |at| (at.byte() as usize).saturating_sub(from));
+        let is_break = |byte: &u8| matches!(byte, b'\r' | b'\n');
+        let breaks = rest.get(skipped..).unwrap_or_default();
+        let skipped = skipped + breaks.iter().take_while(|byte| is_break(byte)).count();
+        let passed = rest.get(..skipped).unwrap_or_default();
+        let lines = passed.iter().filter(|byte| **byte == b'\n').count();
+        self.reached = (from + skipped, line + lines);
+        line + lines
+    }
+}
+
+impl Iterator for SheetRecords<'_> {
+    type Item = Result<(usize, csv::StringRecord), SheetError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let record = self.records.next()?;
+            let record = match record {
+                Ok(record) => record,
+                Err(error) => {
+                    return Some(Err(SheetError::NotATable {
+                        line: self.line_of(error.position()),
+                        what: error.to_string(),
+                    }));
+                }
+            };
+            let line = self.line_of(record.position());
+            if record.iter().any(|cell| !cell.is_empty()) {
+                return Some(Ok((line, record)));
+            }
+        }
     }
 }
 
@@ -175,11 +252,12 @@ fn head(headers: &csv::StringRecord, wanted: &[SheetColumn]) -> Result<SheetHead
 }
 
 /// A row of a table.
-#[derive(Clone, Copy)]
-pub(super) struct SheetRow<'a> {
-    sheet: &'a Sheet,
+#[derive(Clone)]
+pub(crate) struct SheetRow<'a> {
+    sheet: &'a Sheet<'a>,
+    /// As an editor counts it: that of the headers is 1.
     pub line: usize,
-    record: &'a csv::StringRecord,
+    record: csv::StringRecord,
 }
 
 impl SheetRow<'_> {
@@ -197,11 +275,7 @@ impl SheetRow<'_> {
         let Some(text) = self.text(column) else {
             return Ok(None);
         };
-        let with_point = match self.sheet.has_decimal_comma {
-            true => text.replace(',', "."),
-            false => text.to_owned(),
-        };
-        let number: Option<f64> = with_point.parse().ok();
+        let number: Option<f64> = self.with_point(text).parse().ok();
         match number.filter(|number| !number.is_nan()) {
             Some(number) => Ok(Some(number)),
             None => Err(self.wrong(
@@ -214,7 +288,42 @@ impl SheetRow<'_> {
 
     pub fn needed(&self, column: &'static str) -> Result<f64, SheetError> {
         let number = self.number(column)?.filter(|number| number.is_finite());
-        number.ok_or_else(|| self.wrong(column, "is empty or endless".to_owned(), "give a number"))
+        number.ok_or_else(|| {
+            let what = "is empty or endless".to_owned();
+            self.wrong(column, what, "give a number, or take the row out")
+        })
+    }
+
+    /// Whether a cell has a decimal comma.
+    #[cfg(feature = "cli")]
+    pub fn has_decimal_comma(&self, column: &str) -> bool {
+        let text = self.text(column).unwrap_or_default();
+        self.sheet.takes_decimal_commas() && text.contains(',')
+    }
+
+    /// With a decimal point, where numbers may have a decimal comma.
+    pub fn with_point<'c>(&self, text: &'c str) -> Cow<'c, str> {
+        match self.sheet.takes_decimal_commas() && text.contains(',') {
+            true => text.replace(',', ".").into(),
+            false => text.into(),
+        }
+    }
+
+    /// As where a decimal comma stands in a table with commas between its columns.
+    fn refuse_more_cells_than_headers(&self) -> Result<(), SheetError> {
+        let headers = self.sheet.headers;
+        let more = self.record.iter().skip(headers);
+        if !more.into_iter().any(|cell| !cell.is_empty()) {
+            return Ok(());
+        }
+        let what = format!(
+            "the row has {} cells, and there are {headers} headers",
+            self.record.len()
+        );
+        Err(self.row_wrong(what, match self.sheet.separator {
+            b',' => "write numbers with a decimal point where `,` is between columns, or put `;` between them",
+            _ => "let it have as many as there are headers",
+        }))
     }
 
     pub fn wrong(&self, column: &'static str, what: String, remedy: &str) -> SheetError {
@@ -264,6 +373,7 @@ mod tests {
             let cells: Vec<_> = sheet
                 .rows()
                 .map(|row| {
+                    let row = row.unwrap();
                     (
                         row.needed("chainage_m").unwrap(),
                         row.number("radius_m").unwrap(),
@@ -279,7 +389,7 @@ mod tests {
         let said = |text: &str| match Sheet::read(text, &COLUMNS) {
             Ok(sheet) => sheet
                 .rows()
-                .map(|row| row.needed("chainage_m"))
+                .map(|row| row?.needed("chainage_m"))
                 .find_map(Result::err)
                 .map(|e| e.to_string()),
             Err(error) => Some(error.to_string()),
@@ -296,7 +406,22 @@ mod tests {
                 "line 3, column `chainage_m`: \"x\" is no number",
             ),
             ("chainage_m;radius_m\n1.000,5;2\n", "line 2"),
-            ("chainage_m;radius_m\n;2\n", "is empty"),
+            (
+                "chainage_m;radius_m\n;2\n",
+                "line 2, column `chainage_m`: is empty",
+            ),
+            (
+                "chainage_m,radius_m\n1,2\n12,5,300\n",
+                "line 3: the row has 3 cells, and there are 2 headers; write numbers with a decimal point",
+            ),
+            // As an editor counts them, whatever ends a line, and whatever lies between rows.
+            ("chainage_m;radius_m\r\n1;2\r\nx;3\r\n", "line 3, "),
+            (
+                "\u{feff}chainage_m;radius_m\r\n\r\n1;2\r\n;;\r\n\r\nx;3",
+                "line 6, ",
+            ),
+            ("\n\nchainage_m,radius_m\n1,2\n\n\nx,3\n", "line 7, "),
+            ("chainage_m,radius_m\n1,\"2\n\"\nx,3\n", "line 4, "),
         ] {
             let said = said(text).unwrap();
             assert!(said.contains(told), "{told}: {said}");

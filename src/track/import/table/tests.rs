@@ -19,6 +19,7 @@ fn options() -> TableOptions {
         line_number: 1,
         datum: None,
         heading_deg: 30.0,
+        is_open: false,
     }
 }
 
@@ -58,6 +59,79 @@ fn signs_of_radii_are_sides() {
     let turns: Vec<Side> = turns.collect();
     assert_eq!(turns, [Side::Right, Side::Left]);
     assert!(import.file.stated_chainage.is_none());
+}
+
+/// Fails where a unit is taken for another one: metres for millimetres, percent or a ratio for permille.
+#[test]
+fn cants_and_grades_have_the_unit_of_their_column() {
+    let written = |text: &str| {
+        let import = TableImport::read(text, None, &options()).unwrap();
+        (import.file.plan, import.file.grades)
+    };
+    let as_before = written(LINE);
+    for (cant, grade, of_60_mm, falls, rises) in [
+        ("cant_m", "grade_percent", "0,06", "-0,3", "0,2"),
+        ("Cant_M", "gradient_ratio", "0,060", "-3:1000", "1:500"),
+        ("cant_mm", "Grade_ratio", "60,0", "-0,003", " 1 : 500 "),
+    ] {
+        let text = LINE
+            .replace("Cant_mm", cant)
+            .replace("Grade_permille", grade)
+            .replace(";60;", &format!(";{of_60_mm};"))
+            .replace("-3,0", falls)
+            .replace(";2\n", &format!(";{rises}\n"));
+        assert_eq!(written(&text), as_before, "{text}");
+    }
+    let level = LINE
+        .replace("Grade_permille", "grade_ratio")
+        .replace("-3,0", "0");
+    let (_, grades) = written(&level.replace(";2\n", ";-1:40\n"));
+    let grades: Vec<f64> = grades.iter().map(|grade| grade.grade_permille).collect();
+    assert_eq!(grades, [0.0, -25.0]);
+    for (from, to, told) in [
+        (
+            ";2\n",
+            ";1:0\n",
+            "line 6, column `grade_ratio`: \"1\" to \"0\" is no ratio",
+        ),
+        (";2\n", ";1:x\n", "line 6, column `grade_ratio`"),
+        // One to forty, or forty to one?
+        (";2\n", ";40\n", "line 6: "),
+        (
+            "\n12150,0;clothoid;",
+            "\n12150,0;clothoid:1;",
+            "line 3, column `element`",
+        ),
+    ] {
+        let text = level.replacen(from, to, 1);
+        let fault = TableImport::read(&text, None, &options())
+            .unwrap_err()
+            .to_string();
+        assert!(fault.contains(told), "{told}: {fault}");
+    }
+    let twice = "chainage_m,radius_m,length_m,cant_mm,cant_m\n0,400,50,60,0.06\n";
+    let fault = TableImport::read(twice, None, &options())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        fault.contains("line 2, column `cant_m`: `cant_mm` says it too"),
+        "{fault}"
+    );
+}
+
+/// Fails where a line that is in the open has a roof.
+#[test]
+fn a_line_may_lie_in_the_open() {
+    for is_open in [false, true] {
+        let options = TableOptions {
+            is_open,
+            ..options()
+        };
+        let import = TableImport::read(LINE, Some(ROW), &options).unwrap();
+        let tunnel = Tunnel::from_toml(&import.file.to_text(&[]).unwrap()).unwrap();
+        let sections = &tunnel.first_track().sections;
+        assert!(!sections.is_empty() && sections.iter().all(|r| r.section.is_open() == is_open));
+    }
 }
 
 /// Fails where a wrong table passes, or the message does not name line and column.

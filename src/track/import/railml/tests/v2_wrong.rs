@@ -247,3 +247,66 @@ fn wrong_coordinates_are_named() {
     let error = read(&degrees(true)).unwrap_err().to_string();
     assert!(error.contains("are they swapped?"), "{error}");
 }
+
+/// A track between two places, latitude and longitude, of this stated length.
+fn between(places: [[f64; 2]; 2], length_m: f64) -> String {
+    let [a, b] = places.map(|[first, second]| {
+        format!("<geoCoord coord=\"{first:.7} {second:.7}\" epsgCode=\"4326\"/>")
+    });
+    format!(
+        "<railml version=\"2.5\"><infrastructure><tracks><track id=\"t\"><trackTopology>\n\
+         <trackBegin id=\"tb\" pos=\"0\">{a}</trackBegin>\n<trackEnd id=\"te\" pos=\"{length_m}\">{b}</trackEnd>\n\
+         </trackTopology></track></tracks></infrastructure></railml>"
+    )
+}
+
+/// Metres between two places by the radii of curvature of the ellipsoid (WGS 84) in the middle between them.
+fn ellipsoidal_m([a, b]: [[f64; 2]; 2]) -> f64 {
+    let (axis_m, e2) = (6_378_137.0, 0.006_694_379_990_14);
+    let middle = 0.5 * (a[0] + b[0]).to_radians();
+    let w2 = 1.0 - e2 * middle.sin().powi(2);
+    let along_m = axis_m * (1.0 - e2) / w2.powf(1.5) * (b[0] - a[0]).to_radians();
+    let across_m = axis_m / w2.sqrt() * middle.cos() * (b[1] - a[1]).to_radians();
+    along_m.hypot(across_m)
+}
+
+/// Fails where a track from south to north passes with its coordinates the wrong way round, or a right one, straight or
+/// curved, does not pass. On the meridian of Greenwich nothing tells.
+#[test]
+fn swapped_coordinates_are_told_in_any_direction() {
+    for (latitude, longitude) in [(50.9, 4.48), (48.2, 15.6), (30.6, 104.0), (-33.9, 18.4)] {
+        // North, north-east, east and south-east.
+        for [north, east] in [[0.02, 0.0], [0.014, 0.02], [0.0, 0.03], [-0.01, 0.02]] {
+            let places = [[latitude, longitude], [latitude + north, longitude + east]];
+            let length_m = ellipsoidal_m(places);
+            let name = format!("{places:?}");
+            // Straight, by a projection's scale, in hills, and with curves that nothing states.
+            for longer in [0.9996, 1.0, 1.0003, 1.02, 1.1, 1.3] {
+                let read = read(&between(places, longer * length_m));
+                assert!(read.is_ok(), "{name} {longer}: {}", read.unwrap_err());
+            }
+            let swapped = places.map(|[latitude, longitude]| [longitude, latitude]);
+            let error = read(&between(swapped, (10.0 * length_m).round() / 10.0));
+            let error = error.unwrap_err().to_string();
+            let is_told = error.contains("are they swapped?") || error.contains("on no railway");
+            assert!(is_told, "{name}: {error}");
+        }
+    }
+    let greenwich = between([[0.0, 51.5], [0.0, 51.52]], 2225.3);
+    assert!(read(&greenwich).is_ok());
+}
+
+/// Fails where a length that contradicts the coordinates is told as something else.
+#[test]
+fn a_length_that_contradicts_the_coordinates_is_named() {
+    let places = [[50.9, 4.48], [50.9, 4.494_16]];
+    let apart_m = ellipsoidal_m(places);
+    for length_m in [600.0, 3000.0] {
+        let error = read(&between(places, length_m)).unwrap_err().to_string();
+        let told = format!(
+            "line 3: geoCoord (of trackEnd te): its coordinates are {apart_m:.1} m from those of trackBegin tb (line 2), and \
+             the track between them is stated to be {length_m:.1} m long: correct the coordinates, or the stated length"
+        );
+        assert!(error.starts_with(&told), "{error}");
+    }
+}

@@ -2,7 +2,7 @@
 //! file before it is begun. So it holds after a kill too, and nothing that it does not name is ever
 //! removed or written over.
 
-use super::whole_files::{PROBE, locked, open_in_place, part_name, remove, taken, write_whole};
+use super::whole::{locked, open_in_place, part_name, remove, taken, write_whole};
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
@@ -102,6 +102,7 @@ impl Listing {
 
     /// Removes all that the command has listed in a folder, and the list; folders that are empty then
     /// go too.
+    #[cfg(any(test, feature = "twin"))]
     pub fn clear(folder: &Path, command: &str) -> io::Result<()> {
         if let Some(listed) = Self::read(folder, command)? {
             remove_all(folder, &listed)?;
@@ -124,15 +125,6 @@ pub(crate) fn foreign<'a>(
     };
     let mut names = names.into_iter().chain([LIST]);
     Ok(names.find(|name| in_the_way(folder, name, is_ours(name)).is_some()))
-}
-
-/// Whether a folder holds nothing, or is not there.
-pub(crate) fn is_empty(folder: &Path) -> io::Result<bool> {
-    match fs::read_dir(folder) {
-        Ok(entries) => Ok(entries.flatten().all(|entry| entry.file_name() == PROBE)),
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(true),
-        Err(error) => Err(error),
-    }
 }
 
 /// Also of a link that leads nowhere.
