@@ -34,10 +34,11 @@ pub fn compare_headings(
         return;
     };
     let keep = (-run_m / (KEPT_LENGTHS * settings.map_correlation_m)).exp();
-    let of_most = hypotheses[most].mapped_heading(network, settings);
+    let reference = hypotheses.iter().find(|h| h.is_reference());
+    let beside = (reference.unwrap_or(&hypotheses[most])).mapped_heading(network, settings);
     let update = |hypothesis: &mut Hypothesis| {
         let mapped = if hypothesis.is_beside_most() {
-            of_most
+            beside
         } else {
             hypothesis.mapped_heading(network, settings)
         };
@@ -45,13 +46,13 @@ pub fn compare_headings(
         hypothesis.heading_log = keep * hypothesis.heading_log + log;
         mapped.here_rad
     };
-    update(&mut hypotheses[most]);
+    let most_rad = update(&mut hypotheses[most]);
     let most_log = std::mem::take(&mut hypotheses[most].heading_log);
     let parted_rad = parted_rad(settings);
     for (_, hypothesis) in (hypotheses.iter_mut().enumerate()).filter(|(k, _)| *k != most) {
         let mapped_rad = update(hypothesis);
         hypothesis.heading_log -= most_log;
-        if wrapped(mapped_rad - of_most.here_rad).abs() > parted_rad {
+        if wrapped(mapped_rad - most_rad).abs() > parted_rad {
             hypothesis.log_probability += std::mem::take(&mut hypothesis.heading_log);
         }
     }

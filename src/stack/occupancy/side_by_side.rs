@@ -123,6 +123,11 @@ impl Hypothesis {
         self.mean[ASIDE] -= forward.perp(&(self.shift_m() - before_m));
     }
 
+    /// Whether distances count from it.
+    pub fn is_reference(&self) -> bool {
+        self.beside_most.is_some_and(|beside| beside.is_most)
+    }
+
     /// Whether its track is taken to have the heading of the most probable one.
     pub fn is_beside_most(&self) -> bool {
         self.beside_most.is_some_and(|beside| !beside.is_most)

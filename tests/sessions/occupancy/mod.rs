@@ -378,6 +378,9 @@ fn val_maps_of_nearer_points() {
     for (name, map) in [("60 m, 120 m believed", half_as_far), ("25 m, told", told)] {
         for (sigma, map) in [("0.3 m", map), ("0.45 m", worse(map))] {
             let parallel = beside_a_parallel_track(map, 100);
+            parallel
+                .calibration
+                .print(&format!("parallel, {sigma}, {name}"));
             rows.push((format!("parallel, {sigma}, {name}"), parallel));
             rows.push((format!("{sigma}, {name}"), Runs { map, ..FUSED }.tally()));
         }
