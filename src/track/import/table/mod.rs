@@ -10,7 +10,9 @@ mod sheet;
 mod tests;
 
 pub use sheet::SheetError;
-pub(crate) use sheet::{Sheet, SheetColumn, SheetRow};
+#[cfg(feature = "cli")]
+pub(crate) use sheet::SheetRow;
+pub(crate) use sheet::{Sheet, SheetColumn};
 
 use crate::track::check::check;
 use crate::track::file::{
