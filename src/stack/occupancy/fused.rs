@@ -6,6 +6,7 @@
 //!
 //! The sum of yaw rates is the heading of the chord between the bogies, less an offset that drifts.
 
+use super::HEADING_EVERY_M;
 use super::dead_reckoning::TrainRun;
 use super::fix_error::{self, JUMPS, slow_m2};
 use super::fix_trust::Judged;
@@ -163,8 +164,13 @@ impl Hypothesis {
         measured[HEADING] = 1.0;
         measured[TURNED] = 1.0;
         let across = self.covariance * measured.transpose();
-        let variance =
-            (measured * across)[0] + settings.heading_sigma_rad.powi(2) + mapped.bend_rad2;
+        // What a chord has otherwise than its middle is the same for as long as the chord.
+        let chord_rad2 =
+            map_error::chord_rad2(settings) * settings.bogie_distance_m / HEADING_EVERY_M;
+        let variance = (measured * across)[0]
+            + settings.heading_sigma_rad.powi(2)
+            + mapped.bend_rad2
+            + chord_rad2;
         let fits_log =
             (1.0 - WRONG_HEADING).ln() - 0.5 * (off * off / variance + (TAU * variance).ln());
         let wrong_log = (WRONG_HEADING / TAU).ln();

@@ -24,6 +24,15 @@ pub fn stationary(settings: &OccupancySettings) -> Matrix2<f64> {
     )
 }
 
+/// Variance of the difference between h and the same of a chord around it, (m(D/2) - m(-D/2)) / D, which is what a car on
+/// bogies D apart turns by, square radians.
+pub fn chord_rad2(settings: &OccupancySettings) -> f64 {
+    let x = settings.bogie_distance_m / settings.map_correlation_m;
+    let point_rad2 = stationary(settings)[(1, 1)];
+    let chord = 2.0 * (1.0 - (1.0 + x) * (-x).exp()) / x.powi(2);
+    point_rad2 * (1.0 + chord - 2.0 * (-0.5 * x).exp()).max(0.0)
+}
+
 /// What becomes of m and h over a run.
 pub struct MapErrorChange {
     pub transition: Matrix2<f64>,
