@@ -116,7 +116,7 @@ impl Hypothesis {
             .min_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
-    /// Whether the head may be at a place.
+    /// Whether its course leads over a place that is no farther from the head than a foreign balise may be.
     fn runs_over(&self, place: (usize, f64), settings: &OccupancySettings) -> bool {
         self.left_m(place, settings)
             .is_some_and(|left_m| left_m.abs() < FOREIGN_SPAN_M)

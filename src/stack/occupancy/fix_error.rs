@@ -15,17 +15,15 @@ use super::hypothesis::{FIX_ERROR, Hypothesis, KindError};
 use super::settings::OccupancySettings;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
-/// Ways from this one on are jumps.
-pub const JUMPS: usize = 2;
-
 /// One of the ways that both parts of the error may have gone.
 #[derive(Clone, Copy)]
 pub struct ErrorWay {
     pub probability: f64,
-    /// Whether it has nothing to do with the state's error.
+    pub is_jump: bool,
+    /// Whether it replaces the state's error, with which it has nothing to do.
     pub is_own: bool,
     pub error_m: Vector4<f64>,
-    /// Covariance of its own, or what comes to the state's.
+    /// Covariance of the error if it replaces the state's, else what is added to the state's.
     pub more_m2: Matrix4<f64>,
 }
 
@@ -82,6 +80,7 @@ impl Hypothesis {
     ) -> [ErrorWay; 4] {
         let anew = ErrorWay {
             probability: 0.5 * settings.jump_probability,
+            is_jump: false,
             is_own: true,
             error_m: Vector4::zeros(),
             more_m2: *slow_m2,
@@ -102,11 +101,9 @@ impl Hypothesis {
         } else {
             anew
         };
-        let (usual, restored_share) = match (judged.is_new || self.kind.is_none(), other_kind) {
-            (true, _) => (anew, 0.0),
-            (false, true) => (goes_on, 0.5),
-            (false, false) => (goes_on, 0.0),
-        };
+        let is_anew = judged.is_new || self.kind.is_none();
+        let usual = if is_anew { anew } else { goes_on };
+        let restored_share = if other_kind && !is_anew { 0.5 } else { 0.0 };
         self.fix_variances_m2 = now_m2;
         let likely = 1.0 - settings.jump_probability;
         let jump_m2 = Matrix2::identity() * settings.jump_sigma_m.powi(2);
@@ -122,9 +119,13 @@ impl Hypothesis {
             ErrorWay {
                 more_m2: usual.more_m2 + of_parts(&jump_m2, &Matrix2::zeros()),
                 probability: anew.probability,
+                is_jump: true,
                 ..usual
             },
-            anew,
+            ErrorWay {
+                is_jump: true,
+                ..anew
+            },
         ]
     }
 

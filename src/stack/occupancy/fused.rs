@@ -8,11 +8,11 @@
 
 use super::HEADING_EVERY_M;
 use super::dead_reckoning::TrainRun;
-use super::fix_error::{self, JUMPS, slow_m2};
+use super::fix_error::{self, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
     ASIDE, FIX_ERROR, HEADING, Hypothesis, NEAR_M, PLACE, SCALE, STATES, State, StateCovariance,
-    TURNED, YAW_OFFSET, log_sum, wrapped,
+    TURNED, YAW_OFFSET, left_of, log_sum, wrapped,
 };
 use super::map_error::{self, MapErrorChange};
 use super::settings::OccupancySettings;
@@ -127,7 +127,7 @@ impl Hypothesis {
         };
         self.log_probability += all;
         let (way, (_, spread)) = (&ways[most], &found[most]);
-        self.has_jumped = most >= JUMPS;
+        self.has_jumped = way.is_jump;
         self.set_error(way);
         let off = fix - place - self.error_m();
         self.correct(&forward, &off, spread);
@@ -164,7 +164,8 @@ impl Hypothesis {
         measured[HEADING] = 1.0;
         measured[TURNED] = 1.0;
         let across = self.covariance * measured.transpose();
-        // What a chord has otherwise than its middle is the same for as long as the chord.
+        // The heading of a chord differs from that at its middle by an error that stays the same over the chord's length.
+        // Headings are compared more often: for each its variance is so many times larger.
         let chord_rad2 =
             map_error::chord_rad2(settings) * settings.bogie_distance_m / HEADING_EVERY_M;
         let variance = (measured * across)[0]
@@ -262,10 +263,6 @@ fn spread_of_place(covariance: &StateCovariance, forward: &Vector2<f64>) -> Matr
     pairs
         .map(|((i, a), (j, b))| a * b.transpose() * covariance[(*i, *j)])
         .sum()
-}
-
-fn left_of(forward: &Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(-forward.y, forward.x)
 }
 
 fn log_density(off: &Vector2<f64>, spread: &Matrix2<f64>) -> f64 {

@@ -5,9 +5,10 @@
 //! kilometres it makes a wrong track certain, the sooner the worse the map is. So what headings say is kept aside, and
 //! fades over some lengths of the map's errors, until the map has the tracks part by more than it can be wrong.
 
-use super::hypothesis::{Hypothesis, wrapped};
+use super::hypothesis::{Hypothesis, most_probable, wrapped};
 use super::map_error;
 use super::settings::OccupancySettings;
+use super::side_by_side::TrackPlacing;
 use crate::track::plan::PlanNetwork;
 use std::f64::consts::SQRT_2;
 
@@ -29,18 +30,17 @@ pub fn compare_headings(
     (turned_rad, run_m): (f64, f64),
     settings: &OccupancySettings,
 ) {
-    let numbered = hypotheses.iter().map(|h| h.log_probability).enumerate();
-    let Some((most, _)) = numbered.max_by(|(_, a), (_, b)| a.total_cmp(b)) else {
+    let Some(most) = most_probable(hypotheses) else {
         return;
     };
     let keep = (-run_m / (KEPT_LENGTHS * settings.map_correlation_m)).exp();
-    let reference = hypotheses.iter().find(|h| h.is_reference());
-    let beside = (reference.unwrap_or(&hypotheses[most])).mapped_heading(network, settings);
+    let mut references = hypotheses.iter();
+    let reference = references.find(|h| matches!(h.placing, TrackPlacing::Reference));
+    let of_reference = reference.map(|h| h.mapped_heading(network, settings));
     let update = |hypothesis: &mut Hypothesis| {
-        let mapped = if hypothesis.is_beside_most() {
-            beside
-        } else {
-            hypothesis.mapped_heading(network, settings)
+        let mapped = match (hypothesis.placing, of_reference) {
+            (TrackPlacing::Beside(_), Some(heading)) => heading,
+            _ => hypothesis.mapped_heading(network, settings),
         };
         let log = hypothesis.update_heading(&mapped, turned_rad, settings);
         hypothesis.heading_log = keep * hypothesis.heading_log + log;

@@ -4,7 +4,7 @@ use super::balise::DoubtedGroup;
 use super::course::Course;
 use super::fix_error;
 use super::settings::OccupancySettings;
-use super::side_by_side::BesideMost;
+use super::side_by_side::TrackPlacing;
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
@@ -49,6 +49,19 @@ pub fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
+/// The unit vector to the left of another one.
+pub fn left_of(forward: &Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(-forward.y, forward.x)
+}
+
+/// Number of the most probable one.
+pub fn most_probable(hypotheses: &[Hypothesis]) -> Option<usize> {
+    let numbered = hypotheses.iter().map(|h| h.log_probability).enumerate();
+    numbered
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))
+        .map(|(k, _)| k)
+}
+
 /// A course, its probability and the place along it.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
@@ -57,8 +70,7 @@ pub struct Hypothesis {
     pub log_probability: f64,
     /// What headings say of it, against the most probable one, and is not counted yet (see `headings`).
     pub heading_log: f64,
-    /// Beside the most probable one; none where the map has them part.
-    pub beside_most: Option<BesideMost>,
+    pub placing: TrackPlacing,
     pub mean: State,
     pub covariance: StateCovariance,
     /// Of the last fix, what its error had of variance that changes with the surroundings, and that lasts.

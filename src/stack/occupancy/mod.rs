@@ -7,10 +7,11 @@
 //! Nothing is decided before a fix lies on the map or a balise of the map is read.
 //!
 //! What it cannot do: where tracks lie side by side, a receiver whose fixes drift by about half a metre a second for
-//! half a minute, while it states that they are good, makes it certain of a wrong track until the drift has ended. The
-//! same do errors of fixes that last for much longer than [`OccupancySettings::correlation_s`] while a train stands or
-//! creeps, and a map whose errors change over less than [`OccupancySettings::map_correlation_m`], where a yaw rate is
-//! held against it.
+//! half a minute, while it states that they are good, makes it certain of a wrong track until the drift has ended. Errors of
+//! fixes that last longer than [`OccupancySettings::lasting_s`], or have a larger share of the variance than
+//! [`OccupancySettings::lasting_share`], do the same to a train that stands or creeps; so does a map that is worse than
+//! [`OccupancySettings::map_sigma_m`] or whose errors change over less than [`OccupancySettings::map_correlation_m`], to a
+//! train that begins beside a parallel track from nothing.
 //!
 //! Theory: Guo et al. 2020 (see [`Method::Pedal`]) for hypotheses, pedal curve, pruning and the six classes of a
 //! decision; Gerlach and Hoppe 2009 for the baseline; [`Method::Fused`] is a bank of extended Kalman filters with

@@ -9,7 +9,7 @@
 //! nearer to each other than tracks can be, as legs behind a switch are, they are as mapped.
 
 use super::headings;
-use super::hypothesis::{ASIDE, Hypothesis};
+use super::hypothesis::{ASIDE, Hypothesis, left_of, most_probable};
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Point2, Vector2};
@@ -24,39 +24,47 @@ const SAME_HEADING: f64 = 0.5;
 /// are nearer to each other are legs of a switch.
 const CHANGED_SIGMAS: f64 = 3.0;
 
-/// Where the track of a hypothesis lies beside that of the most probable one.
+/// Where the track of a hypothesis is taken to lie.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct BesideMost {
-    /// Whether it is the most probable one.
-    is_most: bool,
-    /// To the left of that one, the mean distance over the last run, metres.
-    mean_m: f64,
-    /// From the mapped place to where it is at the mean distance.
-    pub shift_m: Vector2<f64>,
+pub enum TrackPlacing {
+    #[default]
+    AsMapped,
+    /// As mapped: distances count from it.
+    Reference,
+    Beside(BesideReference),
 }
 
-/// The mapped place of the most probable hypothesis.
-struct MappedMost {
+/// At the mean distance from the reference.
+#[derive(Clone, Copy, Debug)]
+pub struct BesideReference {
+    /// To the left of the reference, the mean over the last run, metres.
+    mean_m: f64,
+    /// From the mapped place to there.
+    shift_m: Vector2<f64>,
+}
+
+/// The mapped place of the reference.
+struct MappedReference {
     place: Point2<f64>,
     forward: Vector2<f64>,
 }
 
-/// Puts the tracks of hypotheses at their mean distances from the most probable one, after a run since the last time.
+/// Puts the tracks of hypotheses at their mean distances from that of the most probable one, after a run since the last
+/// time.
 pub fn compare_distances(
     hypotheses: &mut [Hypothesis],
     network: &PlanNetwork,
     run_m: f64,
     settings: &OccupancySettings,
 ) {
-    let numbered = hypotheses.iter().map(|h| h.log_probability).enumerate();
-    let Some((most, _)) = numbered.max_by(|(_, a), (_, b)| a.total_cmp(b)) else {
+    let Some(most) = most_probable(hypotheses) else {
         return;
     };
     refer_to(hypotheses, most, network);
     let (place, forward) = hypotheses[most]
         .course
         .at(network, hypotheses[most].place_m());
-    let mapped = MappedMost { place, forward };
+    let mapped = MappedReference { place, forward };
     for (_, hypothesis) in (hypotheses.iter_mut().enumerate()).filter(|(k, _)| *k != most) {
         hypothesis.keep_distance(&mapped, network, run_m, settings);
     }
@@ -64,79 +72,73 @@ pub fn compare_distances(
 
 /// Lets distances count from the hypothesis that is now the most probable one. No track moves in the world by that.
 fn refer_to(hypotheses: &mut [Hypothesis], most: usize, network: &PlanNetwork) {
-    let of_most = hypotheses[most].beside_most;
-    if of_most.is_some_and(|beside| beside.is_most) {
-        return;
-    }
-    for hypothesis in hypotheses.iter_mut() {
-        let both = hypothesis.beside_most.zip(of_most);
-        let after = both.map(|(old, of_most)| BesideMost {
-            is_most: false,
-            mean_m: old.mean_m - of_most.mean_m,
-            shift_m: old.shift_m - of_most.shift_m,
-        });
+    let of_most = match hypotheses[most].placing {
+        TrackPlacing::Reference => return,
+        TrackPlacing::Beside(beside) => Some(beside),
+        TrackPlacing::AsMapped => None,
+    };
+    for (k, hypothesis) in hypotheses.iter_mut().enumerate() {
+        let after = match (hypothesis.placing, of_most) {
+            _ if k == most => TrackPlacing::Reference,
+            (TrackPlacing::Reference, Some(most)) => TrackPlacing::Beside(BesideReference {
+                mean_m: -most.mean_m,
+                shift_m: -most.shift_m,
+            }),
+            (TrackPlacing::Beside(beside), Some(most)) => TrackPlacing::Beside(BesideReference {
+                mean_m: beside.mean_m - most.mean_m,
+                shift_m: beside.shift_m - most.shift_m,
+            }),
+            _ => TrackPlacing::AsMapped,
+        };
         let (_, forward) = hypothesis.course.at(network, hypothesis.place_m());
-        hypothesis.set_beside(after, &forward);
+        hypothesis.set_placing(after, &forward);
     }
-    hypotheses[most].beside_most = Some(BesideMost {
-        is_most: true,
-        ..BesideMost::default()
-    });
 }
 
 impl Hypothesis {
     fn keep_distance(
         &mut self,
-        most: &MappedMost,
+        reference: &MappedReference,
         network: &PlanNetwork,
         run_m: f64,
         settings: &OccupancySettings,
     ) {
         let (place, forward) = self.course.at(network, self.place_m());
-        let distance_m = most.forward.perp(&(place - most.place));
+        let left = left_of(&reference.forward);
+        let distance_m = left.dot(&(place - reference.place));
+        let turned_rad = left.dot(&forward).atan2(reference.forward.dot(&forward));
         let change_m = CHANGED_SIGMAS * SQRT_2 * settings.map_sigma_m;
-        let turned_rad = most
-            .forward
-            .perp(&forward)
-            .atan2(most.forward.dot(&forward));
         let most_turned_rad = SAME_HEADING * headings::parted_rad(settings);
         if distance_m.abs() < change_m || turned_rad.abs() > most_turned_rad {
-            self.set_beside(None, &forward);
+            self.set_placing(TrackPlacing::AsMapped, &forward);
             return;
         }
-        let before_m = self.beside_most.map_or(distance_m, |beside| beside.mean_m);
+        let before_m = match self.placing {
+            TrackPlacing::Beside(beside) => beside.mean_m,
+            TrackPlacing::AsMapped | TrackPlacing::Reference => distance_m,
+        };
         let keep = (-run_m / MEAN_M).exp();
         let mean_m = (keep * before_m + (1.0 - keep) * distance_m)
             .clamp(distance_m - change_m, distance_m + change_m);
-        let left = Vector2::new(-most.forward.y, most.forward.x);
-        self.beside_most = Some(BesideMost {
-            is_most: false,
+        self.placing = TrackPlacing::Beside(BesideReference {
             mean_m,
             shift_m: left * (mean_m - distance_m),
         });
     }
 
-    /// Changes what its track is taken to be beside of, without moving it in the world.
-    fn set_beside(&mut self, beside_most: Option<BesideMost>, forward: &Vector2<f64>) {
+    /// Without moving its track in the world.
+    fn set_placing(&mut self, placing: TrackPlacing, forward: &Vector2<f64>) {
         let before_m = self.shift_m();
-        self.beside_most = beside_most;
-        self.mean[ASIDE] -= forward.perp(&(self.shift_m() - before_m));
-    }
-
-    /// Whether distances count from it.
-    pub fn is_reference(&self) -> bool {
-        self.beside_most.is_some_and(|beside| beside.is_most)
-    }
-
-    /// Whether its track is taken to have the heading of the most probable one.
-    pub fn is_beside_most(&self) -> bool {
-        self.beside_most.is_some_and(|beside| !beside.is_most)
+        self.placing = placing;
+        self.mean[ASIDE] -= left_of(forward).dot(&(self.shift_m() - before_m));
     }
 
     /// From its mapped place to where its track is taken to be.
     pub fn shift_m(&self) -> Vector2<f64> {
-        self.beside_most
-            .map_or(Vector2::zeros(), |beside| beside.shift_m)
+        match self.placing {
+            TrackPlacing::Beside(beside) => beside.shift_m,
+            TrackPlacing::AsMapped | TrackPlacing::Reference => Vector2::zeros(),
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use super::course::Course;
 use super::fix_trust::Judged;
 use super::hypothesis::{Hypothesis, State, StateCovariance};
 use super::matching::{Match, by_pedal_curve};
+use super::side_by_side::TrackPlacing;
 use super::{Fix, Method, Occupancy};
 use crate::bus::SimTime;
 use crate::track::Direction;
@@ -127,7 +128,7 @@ impl Occupancy {
             course: Course::at_place(&self.network, towards, found.along_m),
             log_probability: 0.0,
             heading_log: 0.0,
-            beside_most: None,
+            placing: TrackPlacing::default(),
             mean: State::zeros(),
             covariance: StateCovariance::zeros(),
             fix_variances_m2: [0.0; 2],
