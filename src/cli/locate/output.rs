@@ -13,7 +13,7 @@ use std::path::Path;
 /// Names of the files.
 pub const FILES: [&str; 3] = ["tracks.csv", "tracks.geojson", "summary.json"];
 
-/// A decision with this probability or more is fairly confident.
+/// A decision that is more probable is fairly confident.
 const FAIRLY: f64 = 0.9;
 
 /// What is said at a fix.

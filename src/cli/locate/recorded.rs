@@ -17,9 +17,9 @@ const SIGMAS_M: [(&str, f64); 7] = [
     ("SBAS", 1.5),
     ("SINGLE", 2.5),
 ];
-/// One that is carried on from the last fix by an inertial unit through a gap of reception,
+/// Kind of a solution that an inertial unit carries on from the last fix through a gap of reception.
 const CARRIED_ON: &str = "PROPAGATED";
-/// and how fast it drifts, metres a second: with a heading that is wrong by one degree at 60 km/h.
+/// Drift of such a solution, metres a second: with a heading that is wrong by one degree at 60 km/h.
 const DRIFT_MPS: f64 = 0.3;
 /// Of any other kind, or where none is stated.
 const UNKNOWN_SIGMA_M: f64 = 5.0;

@@ -24,7 +24,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Perpendicular => "perpendicular",
-            Self::Pedal => "paper",
+            Self::Pedal => "pedal curve",
             Self::Fused => "fused",
         }
     }

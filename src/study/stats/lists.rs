@@ -7,10 +7,10 @@ use crate::session::quantile as interpolated;
 
 /// The mean of all numbers of all runs, each of which counts for one. It is a ratio of two sums over runs, that of the
 /// numbers and how many they are: the interval is that of a ratio (Cochran, Sampling Techniques, 3rd ed., 9.A, equal
-/// to the delta method), with Student's t of as many runs, within the bounds. Runs without numbers count for nothing;
-/// `None` of fewer than two others.
+/// to the delta method), with Student's t of as many runs, within the bounds. Runs without numbers count for nothing here
+/// and in quantiles; `None` of fewer than two others.
 pub fn mean_of_lists(lists: &[Vec<f64>], bounds: Bounds) -> Option<IntervalEstimate> {
-    let n = lists.iter().filter(|list| !list.is_empty()).count();
+    let n = runs_with_numbers(lists);
     let value = mean(lists, |x| x)?;
     let half = student_t(n)? * sigma(lists, |x| x - value)?;
     let bounds = bounds.kept_by(lists.iter().flatten().copied());
@@ -24,8 +24,8 @@ pub fn mean_of_lists(lists: &[Vec<f64>], bounds: Bounds) -> Option<IntervalEstim
 }
 
 /// The quantile p of all numbers of all runs, each of which counts for one, and may be infinite. The interval is between
-/// those order statistics that would hold the true one if there were only as many numbers, all independent, as know as
-/// well as these which share lies below (Woodruff, J. Am. Stat. Assoc. 47 (1952); Korn and Graubard, Survey Methodology
+/// order statistics of an effective number of independent numbers: so many as would estimate the share below the quantile
+/// with the same variance (Woodruff, J. Am. Stat. Assoc. 47 (1952); Korn and Graubard, Survey Methodology
 /// 24 (1998)). An end that there are too few for is infinite, and so are both of one run. `None` without numbers.
 pub fn quantile_of_lists(lists: &[Vec<f64>], p: f64) -> Option<IntervalEstimate> {
     let mut sorted: Vec<f64> = lists.iter().flatten().copied().collect();
@@ -35,9 +35,13 @@ pub fn quantile_of_lists(lists: &[Vec<f64>], p: f64) -> Option<IntervalEstimate>
     sorted.sort_by(f64::total_cmp);
     let value = interpolated(&sorted, p);
     // Where many numbers are equal, the shares below and not above differ.
-    let worth = worth(lists, |x| x < value).min(worth(lists, |x| x <= value)) as usize;
-    let (i, j) = order_statistics(worth, p);
-    let each = (sorted.len() + 1) as f64 / (worth + 1) as f64;
+    let [below, not_above] = [
+        effective_count(lists, |x| x < value),
+        effective_count(lists, |x| x <= value),
+    ];
+    let count = below.min(not_above) as usize;
+    let (i, j) = order_statistics(count, p);
+    let each = (sorted.len() + 1) as f64 / (count + 1) as f64;
     let low = i.map(|i| (i as f64 * each).floor() as usize);
     let high = j.map(|j| (j as f64 * each).ceil() as usize);
     let at = |k: usize| sorted[k.clamp(1, sorted.len()) - 1];
@@ -45,8 +49,12 @@ pub fn quantile_of_lists(lists: &[Vec<f64>], p: f64) -> Option<IntervalEstimate>
         value,
         low: low.map_or(f64::NEG_INFINITY, at),
         high: high.map_or(f64::INFINITY, at),
-        n: lists.len(),
+        n: runs_with_numbers(lists),
     })
+}
+
+fn runs_with_numbers(lists: &[Vec<f64>]) -> usize {
+    lists.iter().filter(|list| !list.is_empty()).count()
 }
 
 /// The mean over all numbers of what `of` makes of each.
@@ -59,22 +67,24 @@ fn mean(lists: &[Vec<f64>], of: impl Fn(f64) -> f64) -> Option<f64> {
 /// Standard deviation of a mean over all numbers, where `off` is how far a number is from it; `None` of fewer than two
 /// runs that have numbers.
 fn sigma(lists: &[Vec<f64>], off: impl Fn(f64) -> f64) -> Option<f64> {
-    let lists = || lists.iter().filter(|list| !list.is_empty());
-    let runs = lists().count();
-    let numbers = lists().map(Vec::len).sum::<usize>() as f64;
+    let runs = runs_with_numbers(lists);
+    let numbers = lists.iter().map(Vec::len).sum::<usize>() as f64;
     let of_run = |list: &Vec<f64>| list.iter().map(|x| off(*x)).sum::<f64>();
-    let squares: f64 = lists().map(|list| of_run(list).powi(2)).sum();
+    let squares: f64 = lists.iter().map(|list| of_run(list).powi(2)).sum();
     let of_few = runs as f64 / (runs as f64 - 1.0);
     (runs > 1).then(|| (squares * of_few).sqrt() / numbers)
 }
 
-/// As many independent numbers as would know the share of numbers with a property as well as these do; not more than
+/// How many independent numbers would estimate the share of numbers with a property with the same variance; not more than
 /// there are, and 0 of fewer than two runs.
-fn worth(lists: &[Vec<f64>], has: impl Fn(f64) -> bool) -> f64 {
+fn effective_count(lists: &[Vec<f64>], has: impl Fn(f64) -> bool) -> f64 {
     let all = lists.iter().map(Vec::len).sum::<usize>() as f64;
     let is = |x: f64| f64::from(has(x));
     let share = mean(lists, is).unwrap_or_default();
-    let (Some(sigma), Some(t)) = (sigma(lists, |x| is(x) - share), student_t(lists.len())) else {
+    let (Some(sigma), Some(t)) = (
+        sigma(lists, |x| is(x) - share),
+        student_t(runs_with_numbers(lists)),
+    ) else {
         return 0.0;
     };
     let variance = share * (1.0 - share);

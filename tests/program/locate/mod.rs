@@ -9,6 +9,17 @@ use metrotwin::track::{TrackPoint, Tunnel};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
+use std::process::Output;
+
+const TERMINUS: &str = "tunnels/terminus.toml";
+
+/// Runs `locate` on a table of fixes.
+fn locate(network: &str, gnss: &Path, out: &Path) -> Output {
+    let paths = [gnss, out].map(|path| path.display().to_string());
+    let [gnss, out] = &paths;
+    let args = ["locate", "--network", network, "--gnss", gnss, "--out", out];
+    program(args).output().unwrap()
+}
 
 /// Fixes of a train that runs 7 m/s along tracks of the terminus, each from a chainage to another, to the decimetre.
 fn fixes(runs: &[(&str, f64, f64)]) -> String {
@@ -49,30 +60,19 @@ fn a_train_is_located_in_the_depot() {
         fixes(&[("lead", 500.0, 700.0), ("depot 1", 0.0, 60.0)]),
     )
     .unwrap();
-    let [gnss, results] = [gnss, out.join("results")].map(|path| path.display().to_string());
-    let run = program([
-        "locate",
-        "--network",
-        "tunnels/terminus.toml",
-        "--gnss",
-        &gnss,
-        "--out",
-        &results,
-    ])
-    .output()
-    .unwrap();
-    succeeds(&run);
-    let table = fs::read_to_string(format!("{results}/tracks.csv")).unwrap();
+    let results = out.join("results");
+    succeeds(&locate(TERMINUS, &gnss, &results));
+    let table = fs::read_to_string(results.join("tracks.csv")).unwrap();
     let last: Vec<&str> = table.lines().last().unwrap().split(',').collect();
     assert_eq!(
         (last[3], last[5], last[6]),
         ("depot 1", "true", "up"),
         "{table}"
     );
-    let summary = fs::read_to_string(format!("{results}/summary.json")).unwrap();
+    let summary = fs::read_to_string(results.join("summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["visits"][0]["element"], "lead");
-    let map = fs::read_to_string(format!("{results}/tracks.geojson")).unwrap();
+    let map = fs::read_to_string(results.join("tracks.geojson")).unwrap();
     let map: serde_json::Value = serde_json::from_str(&map).unwrap();
     assert_eq!(
         map["features"].as_array().unwrap().len(),
@@ -89,21 +89,11 @@ fn a_table_with_decimal_commas_is_taken() {
     let located = [("points", points), ("commas", commas)].map(|(name, table)| {
         let gnss = out.join(name).with_extension("csv");
         fs::write(&gnss, table).unwrap();
-        let [gnss, results] = [gnss, out.join(name)].map(|path| path.display().to_string());
-        let args = [
-            "locate",
-            "--network",
-            "tunnels/terminus.toml",
-            "--gnss",
-            &gnss,
-            "--out",
-            &results,
-        ];
-        let run = program(args).output().unwrap();
+        let run = locate(TERMINUS, &gnss, &out.join(name));
         succeeds(&run);
         let is_said = printed(&run).contains("commas.csv were taken for decimal commas");
         assert_eq!(is_said, name == "commas", "{}", printed(&run));
-        fs::read_to_string(format!("{results}/tracks.csv")).unwrap()
+        fs::read_to_string(out.join(name).join("tracks.csv")).unwrap()
     });
     assert_eq!(located[0], located[1]);
 }
@@ -115,23 +105,11 @@ fn results_are_listed_and_no_file_of_others_is_lost() {
     let out = folder("listed");
     let gnss = out.join("fixes.csv");
     fs::write(&gnss, fixes(&[("lead", 500.0, 550.0)])).unwrap();
-    let locate = |results: &Path| {
-        let [gnss, results] = [&gnss, results].map(|path| path.display().to_string());
-        let args = [
-            "--network",
-            "tunnels/terminus.toml",
-            "--gnss",
-            &gnss,
-            "--out",
-            &results,
-        ];
-        program(["locate"].iter().chain(&args)).output().unwrap()
-    };
     let results = out.join("results");
     for name in ["tracks.csv", "summary.json", "files.txt"] {
         fs::create_dir(&results).unwrap();
         fs::write(results.join(name), "mine").unwrap();
-        let run = locate(&results);
+        let run = locate(TERMINUS, &gnss, &results);
         refuses(
             &run,
             "is there already, and this command has not written it",
@@ -144,7 +122,7 @@ fn results_are_listed_and_no_file_of_others_is_lost() {
     fs::create_dir(&results).unwrap();
     fs::write(results.join("notes.txt"), "mine").unwrap();
     for _ in 0..2 {
-        succeeds(&locate(&results));
+        succeeds(&locate(TERMINUS, &gnss, &results));
         let written = content(&results);
         let list = String::from_utf8(written["files.txt"].clone()).unwrap();
         let mut listed: Vec<&str> = list
@@ -166,42 +144,29 @@ fn wrong_recordings_are_refused() {
     let [gnss, network] = ["fixes.csv", "network.geojson"].map(|name| out.join(name));
     let said = |network: &str, table: &str| {
         fs::write(&gnss, table).unwrap();
-        let gnss = gnss.display().to_string();
-        let results = out.join("results").display().to_string();
-        let run = program([
-            "locate",
-            "--network",
-            network,
-            "--gnss",
-            &gnss,
-            "--out",
-            &results,
-        ])
-        .output()
-        .unwrap();
+        let run = locate(network, &gnss, &out.join("results"));
         assert_eq!(run.status.code(), Some(2), "{run:?}");
         assert!(!out.join("results").exists());
         printed(&run)
     };
     let right = fixes(&[("u1", 0.0, 50.0)]);
-    let terminus = "tunnels/terminus.toml";
     let swapped = right.replacen("latitude,longitude", "longitude,latitude", 1);
     assert!(
-        said(terminus, &swapped).contains("not on any railway"),
+        said(TERMINUS, &swapped).contains("not on any railway"),
         "{}",
-        said(terminus, &swapped)
+        said(TERMINUS, &swapped)
     );
     let far = "time,latitude,longitude\n0,50.9,4.5\n";
     assert!(
-        said(terminus, far).contains("swapped"),
+        said(TERMINUS, far).contains("swapped"),
         "{}",
-        said(terminus, far)
+        said(TERMINUS, far)
     );
     let cut = "time,latitude,longitude\n0,30.55\n";
     assert!(
-        said(terminus, cut).contains("line 2"),
+        said(TERMINUS, cut).contains("line 2"),
         "{}",
-        said(terminus, cut)
+        said(TERMINUS, cut)
     );
     assert!(said("tunnels/test_bench.toml", &right).contains("[datum]"));
     fs::write(&network, "{ \"features\": [").unwrap();

@@ -13,15 +13,16 @@ use super::place::KnownPlace;
 use super::stated::SAME_POINT_M;
 use crate::track::geodesy::{Datum, Geodetic};
 
-/// Distances the two ways are told apart by more than this, metres,
+/// Two distances differ if they are farther apart than this, metres, plus `APART` of the length.
 const APART_M: f64 = 0.5;
-/// and this part of the length: scales of projections and heights over the sea are less.
+/// Scales of projections and heights over the sea change lengths by less.
 const APART: f64 = 0.001;
-/// A distance is as stated to this, metres, which is a digit of coordinates in millionths of a degree,
+/// A distance is as stated if it is off by no more than this, metres, a digit of coordinates in millionths of a degree, plus
+/// `EXACT` of the length.
 const EXACT_M: f64 = 0.1;
-/// and this part of the length;
+/// See `EXACT_M`.
 const EXACT: f64 = 0.0005;
-/// and the other one is so many times as far off.
+/// The distance the other way round must be off by more than so many times as much.
 const CLEARLY: f64 = 4.0;
 
 /// Two places that follow each other along a track, by their distance there and on the earth.
