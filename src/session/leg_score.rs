@@ -63,7 +63,7 @@ impl LegScore {
     /// Takes a report in, with the legs of the train's route and whether the report names the track that the antenna is
     /// on, with no other left. A leg is entered when the head passes its toe, and left with the antenna, or where the
     /// head goes back.
-    pub fn report(&mut self, legs: &[FacingLeg], at: ReportedAt, is_told: bool) {
+    pub fn report(&mut self, legs: &[FacingLeg], at: ReportedAt, is_identified: bool) {
         let before_m = self.head_m.replace(at.head_m).unwrap_or(at.head_m);
         // A report may come after several toes.
         let passed = legs
@@ -79,7 +79,7 @@ impl LegScore {
             if let Some(now) = legs.find(|leg| leg.begins_at(entered.leg.toe_m)) {
                 entered.leg = *now;
             }
-            entered.report(at, is_told);
+            entered.report(at, is_identified);
         }
         let left = self.entered.extract_if(.., |entered| entered.is_left(at));
         self.left.extend(left.map(|entered| entered.identified_m));
@@ -95,15 +95,15 @@ impl LegScore {
 
 impl EnteredLeg {
     /// Only what is said while the antenna is on the leg is said of it.
-    fn report(&mut self, at: ReportedAt, is_told: bool) {
+    fn report(&mut self, at: ReportedAt, is_identified: bool) {
         let FacingLeg { toe_m, end_m } = self.leg;
         if !(toe_m..end_m).contains(&at.antenna_m) {
             return;
         }
         let near_end = at.antenna_m > end_m - BEFORE_END_M;
         self.identified_m = match self.identified_m {
-            Some(m) if is_told || near_end => Some(m),
-            _ => is_told.then_some(at.head_m - toe_m),
+            Some(m) if is_identified || near_end => Some(m),
+            _ => is_identified.then_some(at.head_m - toe_m),
         };
     }
 
@@ -130,13 +130,13 @@ mod tests {
     /// A run of a train whose antenna is 10 m behind the head: places of the head, and whether the track is told there.
     fn distances(run: &[(f64, bool)]) -> Vec<Option<f64>> {
         let mut score = LegScore::default();
-        for (head_m, is_told) in run {
+        for (head_m, is_identified) in run {
             let antenna_m = head_m - 10.0;
             let at = ReportedAt {
                 head_m: *head_m,
                 antenna_m,
             };
-            score.report(&LEGS, at, *is_told);
+            score.report(&LEGS, at, *is_identified);
         }
         score.finish()
     }

@@ -46,7 +46,6 @@ pub use event::{
     Event, Exposure, Observer, ObserverError, Opening, Source, TrainOpening, TrainPoint,
 };
 pub use fitting::{Fitted, Fitting, Mounted};
-pub(crate) use occupancy_figures::mean_of_identified_m;
 pub use occupancy_figures::{FacingFigures, LegDistances, OccupancyClass, OccupancyFigures};
 pub(crate) use presence::FieldOfView;
 pub use profile::{DrawingProfile, PassCost, profile};

@@ -17,13 +17,10 @@ pub struct OccupancyFigures {
     /// Of these, legs that were not identified before they were left, or not to their end, or to that of the run.
     pub never_identified: u32,
     /// From the toe to where the train's head was when the leg was identified for good, which needs a report of the
-    /// antenna's place on the leg: mean of the legs that were, `null` where none was. Those of `never_identified` have no
-    /// distance and are not in it.
-    pub identified_mean_m: Option<f64>,
-    /// The same distance over all legs; `null` without legs.
-    pub known_after_m: Option<LegDistances>,
+    /// antenna's place on the leg; `null` without legs.
+    pub identified_after_m: Option<LegDistances>,
     /// The same of each leg in order; `null` where it was never identified.
-    pub legs_known_after_m: Vec<Option<f64>>,
+    pub legs_identified_after_m: Vec<Option<f64>>,
     /// How many fixes are of which class: `wc`, `wf`, `wu` wrong, `cu`, `cf`, `cc` correct, each confident, fairly
     /// confident or undecided; `ns` nothing said.
     pub classes: BTreeMap<OccupancyClass, u32>,
@@ -69,13 +66,17 @@ pub struct FacingFigures {
     pub wrong_certain: u32,
 }
 
-/// Order statistics of the distance from the toe to the head when a leg was known, over all legs: one that was never identified
-/// counts as farther than any other. `null`: more than the leg, because the statistic falls among these.
+/// Distances from the toe to the head when a leg was identified for good.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[allow(missing_docs, reason = "the names say it")]
 pub struct LegDistances {
+    /// Of the legs that were identified, `null` where none was: those of `never_identified` have no distance.
+    pub mean: Option<f64>,
+    /// Median over all legs. One that was never identified counts as farther than any other; `null`: more than the leg,
+    /// because the median falls among these.
     pub p50: Option<f64>,
+    /// 95 % of all legs, as the median.
     pub p95: Option<f64>,
+    /// The longest of all legs, as the median.
     pub max: Option<f64>,
 }
 
@@ -87,6 +88,7 @@ impl LegDistances {
         let of = ErrorStatistics::of(&mut all)?;
         let finite = |m: f64| m.is_finite().then_some(m);
         Some(Self {
+            mean: mean_of_identified_m(legs_m),
             p50: finite(of.p50),
             p95: finite(of.p95),
             max: finite(of.max),
@@ -95,7 +97,7 @@ impl LegDistances {
 }
 
 /// Mean of the distances of the legs that were identified; `None` where none was.
-pub(crate) fn mean_of_identified_m(legs_m: &[Option<f64>]) -> Option<f64> {
+fn mean_of_identified_m(legs_m: &[Option<f64>]) -> Option<f64> {
     let identified = || legs_m.iter().flatten();
     let count = identified().count();
     (count > 0).then(|| identified().sum::<f64>() / count as f64)

@@ -1,9 +1,7 @@
 //! Scores of track occupancy: what is said after each fix, and how soon after a switch its leg is known.
 
 use super::leg_score::{FacingLeg, LegScore, ReportedAt};
-use super::occupancy_figures::{
-    FacingFigures, LegDistances, OccupancyClass, OccupancyFigures, mean_of_identified_m,
-};
+use super::occupancy_figures::{FacingFigures, LegDistances, OccupancyClass, OccupancyFigures};
 use super::statistics::ErrorStatistics;
 use crate::bus::{OccupancyReport, SimTime, TrainId};
 use crate::scenario::OnboardSettings;
@@ -68,8 +66,8 @@ impl OccupancyScore {
         let antenna_m = self.antenna_m(world, id, report.time)?;
         let (truth, facing) = world.route(id)?.place(antenna_m);
         let class = class_of(report, truth.track);
-        let is_told = class == OccupancyClass::CorrectConfident;
-        self.follow(world, id, antenna_m, is_told);
+        let is_identified = class == OccupancyClass::CorrectConfident;
+        self.follow(world, id, antenna_m, is_identified);
         self.facing.add(report, (truth.track, facing));
         if self.has_receiver && !report.of_fix {
             return Some(Judged { truth, class: None });
@@ -90,13 +88,13 @@ impl OccupancyScore {
 
     /// Follows the train over the toes of switches. What counts for a leg is said of the place of the antenna, and the
     /// distance is that of the head, which is the first to be in another train's way, when the report is sent.
-    fn follow(&mut self, world: &World, id: TrainId, antenna_m: f64, is_told: bool) {
+    fn follow(&mut self, world: &World, id: TrainId, antenna_m: f64, is_identified: bool) {
         let (Some(route), Some(head_m)) = (world.route(id), world.run_m(id)) else {
             return;
         };
         let legs = FacingLeg::all(world.network(), route);
         let at = ReportedAt { head_m, antenna_m };
-        self.legs.report(&legs, at, is_told);
+        self.legs.report(&legs, at, is_identified);
     }
 
     /// The figures.
@@ -110,9 +108,8 @@ impl OccupancyScore {
             fixes_in_all,
             switches: legs_m.len() as u32,
             never_identified: legs_m.iter().filter(|m| m.is_none()).count() as u32,
-            identified_mean_m: mean_of_identified_m(&legs_m),
-            known_after_m: LegDistances::of(&legs_m),
-            legs_known_after_m: legs_m,
+            identified_after_m: LegDistances::of(&legs_m),
+            legs_identified_after_m: legs_m,
             classes: self.classes,
             facing: self.facing,
             nees_mean: (right > 0).then(|| self.nees_sum / right as f64),

@@ -1,8 +1,6 @@
 //! Track occupancy of a run: of all its trains that report it, from their counts together.
 
-use crate::session::{
-    LegDistances, OccupancyClass, OccupancyFigures, TrainSummary, mean_of_identified_m,
-};
+use crate::session::{LegDistances, OccupancyClass, OccupancyFigures, TrainSummary};
 
 /// The figures of those trains, at least one.
 pub struct OccupancyOfTrains<'a>(Vec<&'a OccupancyFigures>);
@@ -39,17 +37,17 @@ impl<'a> OccupancyOfTrains<'a> {
         let legs = self
             .0
             .iter()
-            .flat_map(|figures| &figures.legs_known_after_m);
+            .flat_map(|figures| &figures.legs_identified_after_m);
         legs.copied().collect()
     }
 
     /// Mean of the legs that were identified.
     pub fn identified_mean_m(&self) -> Option<f64> {
-        mean_of_identified_m(&self.legs_m())
+        LegDistances::of(&self.legs_m())?.mean
     }
 
     /// The longest of all legs; `None` where one was never identified, or there is none.
-    pub fn known_max_m(&self) -> Option<f64> {
+    pub fn identified_max_m(&self) -> Option<f64> {
         LegDistances::of(&self.legs_m())?.max
     }
 
@@ -93,9 +91,8 @@ mod tests {
             fixes_in_all: wrong + right + wrong / 2,
             switches: legs.len() as u32,
             never_identified: legs.iter().filter(|leg| leg.is_none()).count() as u32,
-            identified_mean_m: None,
-            known_after_m: None,
-            legs_known_after_m: legs.to_vec(),
+            identified_after_m: None,
+            legs_identified_after_m: legs.to_vec(),
             classes: [
                 (WrongConfident, wrong),
                 (NothingSaid, wrong / 2),
@@ -130,11 +127,11 @@ mod tests {
             (1, vec![Some(40.0), None, Some(20.0)])
         );
         assert_eq!(
-            (all.identified_mean_m(), all.known_max_m()),
+            (all.identified_mean_m(), all.identified_max_m()),
             (Some(30.0), None)
         );
         let others = OccupancyOfTrains::of(None, &trains[2..]).unwrap();
-        assert_eq!(others.known_max_m(), Some(20.0));
+        assert_eq!(others.identified_max_m(), Some(20.0));
         let nees = (90.0 * 4.0 + 300.0) / 390.0;
         assert!((all.nees_mean().unwrap() - nees).abs() < 1e-12);
         assert_eq!(all.error_max_m(), Some(0.4));

@@ -34,8 +34,8 @@ const NEUTRAL: [&str; 9] = [
 /// Figures of something that may never come about, and the count of how often it did not: so many of their values are
 /// beyond every number.
 const BEYOND: [(&str, &str); 2] = [
-    ("occupancy_known_max_m", "occupancy_never_identified"),
-    ("occupancy_known_leg_m", "occupancy_never_identified"),
+    ("occupancy_identified_max_m", "occupancy_never_identified"),
+    ("occupancy_leg_m", "occupancy_never_identified"),
 ];
 
 /// The name of the count of values of a figure that are beyond every number.

@@ -17,7 +17,7 @@ fn rows() -> Vec<Row> {
     ];
     let leaves = [json!([5.0]), json!([5.0]), json!([5.0, 5.0]), json!([])];
     let run = |rail: &str, k: u64, legs_m: &Value| {
-        let figures = json!({"occupancy_known_leg_m": legs_m, "occupancy_switches": k + 1,
+        let figures = json!({"occupancy_leg_m": legs_m, "occupancy_switches": k + 1,
             "occupancy_wrong_confident": if rail == "dry" { 2 * k } else { 0 },
             "collision": rail == "dry" && k == 0});
         let status = if k < 3 {
@@ -55,7 +55,7 @@ fn figures_stand_by_swept_value() {
         digest
             .figures
             .iter()
-            .all(|f| f.measure.name != "occupancy_known_leg_m")
+            .all(|f| f.measure.name != "occupancy_leg_m")
     );
     let [by_rail] = &digest.swept[..] else {
         panic!("{} variables", digest.swept.len());
@@ -63,7 +63,7 @@ fn figures_stand_by_swept_value() {
     assert_eq!(by_rail.variable, "rail");
     let of = |name| figure(&by_rail.figures, name);
 
-    let [dry, leaves] = of("occupancy_known_leg_m").unwrap();
+    let [dry, leaves] = of("occupancy_leg_m").unwrap();
     assert_eq!((dry.numbers, dry.runs, dry.lacking), (3, 2, 2));
     assert_eq!((leaves.numbers, leaves.runs, leaves.lacking), (4, 3, 1));
     for (figure, mean_m) in [(dry, 30.0), (leaves, 5.0)] {
@@ -110,10 +110,9 @@ fn what_never_came_about_is_farther_than_any_number() {
             19 => (Vec::new(), 2),
             _ => (vec![known_m(k); 2], 0),
         };
-        let mut figures =
-            json!({"occupancy_known_leg_m": legs_m, "occupancy_never_identified": never});
+        let mut figures = json!({"occupancy_leg_m": legs_m, "occupancy_never_identified": never});
         if never == 0 {
-            figures["occupancy_known_max_m"] = json!(known_m(k));
+            figures["occupancy_identified_max_m"] = json!(known_m(k));
         }
         let mut row = row(k, Status::Complete, figures);
         row.values.insert("rail".to_owned(), json!("dry"));
@@ -130,7 +129,7 @@ fn what_never_came_about_is_farther_than_any_number() {
     let page = fs::read_to_string(base.join("report.html")).unwrap();
     assert!(page.contains("40, 3 never"), "{page}");
     fs::remove_dir_all(base).ok();
-    let of_name = |f: &&FigureDigest| f.measure.name == "occupancy_known_max_m";
+    let of_name = |f: &&FigureDigest| f.measure.name == "occupancy_identified_max_m";
     let most = digest.figures.iter().find(of_name).unwrap();
     assert_eq!((most.runs, most.lacking, most.beyond), (20, 0, 2));
     assert!((most.mean.unwrap().value - 18.5).abs() < 1e-9);
@@ -140,7 +139,7 @@ fn what_never_came_about_is_farther_than_any_number() {
     assert_eq!(finite, [true, false, false]);
 
     let mut by_rail = digest.swept[0].figures.iter();
-    let legs = by_rail.find(|f| f.name == "occupancy_known_leg_m");
+    let legs = by_rail.find(|f| f.name == "occupancy_leg_m");
     let legs = &legs.unwrap().values[0].digest;
     assert_eq!((legs.runs, legs.numbers, legs.beyond), (20, 40, 3));
     let expected_m = (2.0 * (0..18).map(known_m).sum::<f64>() + known_m(18)) / 37.0;
@@ -148,7 +147,7 @@ fn what_never_came_about_is_farther_than_any_number() {
     let finite = legs.quantiles.map(|q| q.unwrap().value.is_finite());
     assert_eq!(finite, [true, true, false]);
     // That it was more than a distance is known of a leg that never was.
-    let over = Condition::parse("occupancy_known_max_m > 1000").unwrap();
+    let over = Condition::parse("occupancy_identified_max_m > 1000").unwrap();
     let outcomes = [0, 19].map(|k: usize| rows[k].outcome(&over));
     assert_eq!(outcomes, [Some(false), Some(true)]);
 }

@@ -83,7 +83,7 @@ fn a_train_finds_its_track_in_a_depot() {
     assert_eq!(occupancy.classes[&OccupancyClass::WrongConfident], 0);
     assert_eq!(occupancy.never_identified, 0);
     // A leg with a radius of 200 m is 4 m aside after 40 m; the antenna is 10 m behind the head.
-    let most_m = occupancy.known_after_m.unwrap().max;
+    let most_m = occupancy.identified_after_m.unwrap().max;
     assert!(most_m.is_some_and(|m| m < 50.0), "{most_m:?}");
     let (_, last) = heard.reports.last().unwrap();
     assert!(last.identified);
@@ -181,7 +181,7 @@ fn the_published_method_takes_longer() {
             occupancy.fixes > 400 && occupancy.switches >= 2,
             "{occupancy:?}"
         );
-        let median_m = occupancy.known_after_m.unwrap().p50;
+        let median_m = occupancy.identified_after_m.unwrap().p50;
         (
             median_m.unwrap_or(f64::INFINITY),
             occupancy.classes[&OccupancyClass::WrongConfident],

@@ -124,8 +124,8 @@ fn is_worth_plotting(measure: &Measure) -> bool {
         "detection_distance_error_m",
         "stop_margin_m",
         "stop_error_m",
-        "occupancy_known_mean_m",
-        "occupancy_known_max_m",
+        "occupancy_identified_mean_m",
+        "occupancy_identified_max_m",
         "occupancy_confident_share",
     ];
     measure.kind == Kind::Real && ASKED.contains(&measure.name)

@@ -85,7 +85,7 @@ fn worst(digest: &Digest, rows: &[Row]) -> Option<Worst> {
         "paper_error_max_m",
         "missed",
         "detection_latency_s",
-        "occupancy_known_max_m",
+        "occupancy_identified_max_m",
         "stop_error_m",
         "most_slip_mps",
     ];
