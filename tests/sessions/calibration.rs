@@ -40,12 +40,14 @@ impl Said {
     /// Probability that of as many as this are said to be wrong at least so many are (Poisson's, which is wider than
     /// that of independent decisions).
     fn at_least(&self) -> f64 {
-        let terms = (0..self.wrong).scan((-self.expected_wrong).exp(), |term, k| {
-            let now = *term;
-            *term *= self.expected_wrong / (k + 1) as f64;
-            Some(now)
-        });
-        1.0 - terms.sum::<f64>()
+        let expected = self.expected_wrong;
+        let mut log_term = -expected;
+        let mut below = 0.0;
+        for k in 0..self.wrong {
+            below += log_term.exp();
+            log_term += expected.ln() - ((k + 1) as f64).ln();
+        }
+        1.0 - below
     }
 }
 
@@ -125,6 +127,24 @@ fn too_many_wrong_ones_are_seen() {
         }
         let probability = of.least_probability();
         assert_eq!(probability > 1e-3, passes, "{wrong}: {probability}");
+    }
+}
+
+/// Fails where many that are expected wrong hide many more.
+#[test]
+fn many_wrong_ones_are_seen() {
+    for (wrong, is_seen) in [(900, false), (1050, false), (2000, true)] {
+        let said = Said {
+            decisions: 4000,
+            expected_wrong: 1000.0,
+            wrong,
+        };
+        assert_eq!(
+            said.at_least() < 1e-3,
+            is_seen,
+            "{wrong}: {}",
+            said.at_least()
+        );
     }
 }
 

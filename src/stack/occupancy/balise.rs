@@ -1,11 +1,10 @@
 //! What balises say of the hypotheses: the train is on their track, and where on it.
 //!
 //! A group of balises may be one of another track than the train's: by cross-talk, or because the map has the group on a
-//! wrong track. Both are so of a whole group, not of each of its balises, and mostly of a track abreast. So for each
-//! hypothesis the probability w that a group is foreign is carried from balise to balise: with L the likelihood of a
-//! reading if the group is the train's own, and F if it is foreign, a reading has the likelihood (1 - w) L + w F, and
-//! then w becomes w F over that. One group therefore says no more against a track than the probability of a foreign one,
-//! however many balises it has.
+//! wrong track. Both are so of a whole group, not of each of its balises, and as a rule of a track abreast. So for each
+//! hypothesis the probabilities are carried from balise to balise that a group is the train's own, of a track abreast, or
+//! from anywhere: each times the likelihood that it gives a reading, over their sum, which is the likelihood of the reading.
+//! One group therefore says no more against a track than the probability of a foreign one, however many balises it has.
 
 use super::Occupancy;
 use super::hypothesis::{Hypothesis, PLACE};
@@ -20,20 +19,58 @@ use std::f64::consts::TAU;
 /// Probability that a group of balises is not of the train's track: cross-talk (a balise 1.4 m beside the antenna must not
 /// be read, SUBSET-036), or a map with the group on a wrong track.
 const FOREIGN: f64 = 1e-6;
-/// Half of the foreign balises lie abreast: so many metres away at most.
+/// Of these, the share that is from anywhere, and not from a track abreast.
+const FROM_ANYWHERE: f64 = 0.5;
+/// A track abreast is no farther away, metres.
 const ABREAST_M: f64 = 20.0;
-/// The other half lies anywhere within so many metres before and behind the place of a hypothesis.
-const FOREIGN_SPAN_M: f64 = 200.0;
+/// A balise from anywhere lies within so many metres before and behind the place of a hypothesis.
+const ANYWHERE_M: f64 = 200.0;
 /// Balises of a group are no farther from one to the next, metres: 12 m (SUBSET-040) and what a map may be off.
 const GROUP_M: f64 = 15.0;
+/// A group that is farther away than this is behind the train: the next time it counts as any other, metres.
+const BEHIND_M: f64 = 100.0;
 
-/// A group of balises that may be foreign.
+/// A group of balises, if a hypothesis is right.
 #[derive(Clone, Copy, Debug)]
-pub struct DoubtedGroup {
+pub struct BaliseGroup {
+    element: usize,
     /// Of its last balise that was read, on the map.
     place: Point2<f64>,
-    /// Probability that it is foreign, if the hypothesis is right.
-    foreign: f64,
+    of: GroupOf,
+}
+
+/// Probabilities of what a group is: the train's own, of a track abreast, from anywhere.
+#[derive(Clone, Copy, Debug)]
+struct GroupOf {
+    own: f64,
+    abreast: f64,
+    anywhere: f64,
+}
+
+impl GroupOf {
+    /// Before one of its balises is read.
+    const UNREAD: Self = Self {
+        own: 1.0 - FOREIGN,
+        abreast: FOREIGN * (1.0 - FROM_ANYWHERE),
+        anywhere: FOREIGN * FROM_ANYWHERE,
+    };
+
+    /// After a reading that has these densities, and the density of the reading. No group is ever the train's own for certain,
+    /// or not.
+    fn after(&self, density: &Self) -> (Self, f64) {
+        let [own, abreast, anywhere] = [
+            self.own * density.own,
+            self.abreast * density.abreast,
+            self.anywhere * density.anywhere,
+        ];
+        let sum = own + abreast + anywhere;
+        let after = Self {
+            own: (own / sum).clamp(FOREIGN, 1.0 - FOREIGN),
+            abreast: abreast / sum,
+            anywhere: anywhere / sum,
+        };
+        (after, sum)
+    }
 }
 
 impl Occupancy {
@@ -45,55 +82,70 @@ impl Occupancy {
         self.advance();
         let place = (element, along_m);
         if self.hypotheses.is_empty() {
-            self.start_at_balise(time, place);
+            self.start_at_balise(place);
         } else {
             let is_expected = (self.hypotheses.iter()).any(|h| h.runs_over(place, &self.settings));
-            if is_expected {
-                self.reckoning.known_to(self.settings.balise_sigma_m);
-            } else {
+            if !is_expected {
                 // The right one may have been dropped, with no more than that probability.
                 let least_log = self.settings.least_probability.ln();
-                self.add_at(time, place, least_log);
+                self.add_at(place, least_log);
             }
-            let (network, settings) = (&self.network, &self.settings);
-            for hypothesis in &mut self.hypotheses {
-                hypothesis.update_balise(network, place, settings);
-            }
+            self.update_by_balise(place);
         }
         self.tidy();
     }
 
     /// On its track, or on one beside it if the balise is foreign, whichever way.
-    fn start_at_balise(&mut self, time: SimTime, (element, along_m): (usize, f64)) {
-        self.add_at(time, (element, along_m), 0.0);
+    fn start_at_balise(&mut self, (element, along_m): (usize, f64)) {
+        self.add_at((element, along_m), 0.0);
         let (place, _) = self.network.elements[element].at(along_m);
         for other in self.network.near(&place, ABREAST_M) {
             let all = [0.0, self.network.elements[other].length_m()];
             let exact = Matrix2::identity();
             let found = by_perpendicular(&self.network.elements[other], all, &place, &exact);
             if let Some(found) = found.filter(|_| other != element) {
-                self.add_at(time, (other, found.along_m), FOREIGN.ln());
+                self.add_at((other, found.along_m), FOREIGN.ln());
             }
         }
+        let foreign = GroupOf {
+            own: FOREIGN,
+            abreast: 1.0,
+            anywhere: 0.0,
+        };
         for hypothesis in &mut self.hypotheses {
             if hypothesis.towards().element != element {
-                let foreign = 1.0;
-                hypothesis
-                    .doubted_groups
-                    .push(DoubtedGroup { place, foreign });
+                hypothesis.balise_groups.push(BaliseGroup {
+                    element,
+                    place,
+                    of: foreign,
+                });
             }
         }
     }
 
+    fn update_by_balise(&mut self, place: (usize, f64)) {
+        let (network, settings) = (&self.network, &self.settings);
+        let mut of_most = (f64::NEG_INFINITY, false);
+        for hypothesis in &mut self.hypotheses {
+            let is_placed = hypothesis.update_balise(network, place, settings);
+            if hypothesis.log_probability > of_most.0 {
+                of_most = (hypothesis.log_probability, is_placed);
+            }
+        }
+        if of_most.1 {
+            self.reckoning.known_to(settings.balise_sigma_m);
+        }
+    }
+
     /// Hypotheses with the head at a place, both ways.
-    fn add_at(&mut self, time: SimTime, (element, along_m): (usize, f64), log_probability: f64) {
+    fn add_at(&mut self, (element, along_m): (usize, f64), log_probability: f64) {
         let found = Match {
             along_m,
             away_m: 0.0,
             sigma_m: self.settings.balise_sigma_m,
         };
         for way in [Direction::Up, Direction::Down] {
-            let mut hypothesis = self.new_hypothesis(ElementEnd { element, way }, &found, time);
+            let mut hypothesis = self.new_hypothesis(ElementEnd { element, way }, &found);
             hypothesis.mean[PLACE] -= self.settings.antenna_behind_head_m;
             hypothesis.covariance[(PLACE, PLACE)] = self.settings.balise_sigma_m.powi(2);
             hypothesis.log_probability = log_probability;
@@ -119,7 +171,7 @@ impl Hypothesis {
     /// Whether its course leads over a place that is no farther from the head than a foreign balise may be.
     fn runs_over(&self, place: (usize, f64), settings: &OccupancySettings) -> bool {
         self.left_m(place, settings)
-            .is_some_and(|left_m| left_m.abs() < FOREIGN_SPAN_M)
+            .is_some_and(|left_m| left_m.abs() < ANYWHERE_M)
     }
 
     /// How far the train has to run until its head is abreast of a place; none where that is too far aside.
@@ -135,44 +187,57 @@ impl Hypothesis {
         (forward.perp(&away).abs() < ABREAST_M).then(|| forward.dot(&away))
     }
 
+    /// Takes a balise in; whether that tells the place.
     fn update_balise(
         &mut self,
         network: &PlanNetwork,
-        place: (usize, f64),
+        (element, along_m): (usize, f64),
         settings: &OccupancySettings,
-    ) {
-        let (mapped, _) = network.elements[place.0].at(place.1);
-        let off_m = self.left_m(place, settings);
+    ) -> bool {
+        let (mapped, _) = network.elements[element].at(along_m);
+        let own_m = self.left_m((element, along_m), settings);
+        let abreast_m = self.left_abreast_m(network, &mapped, settings);
         let variance_m2 = self.covariance[(PLACE, PLACE)] + settings.balise_sigma_m.powi(2);
-        let density = |off_m: Option<f64>| {
-            off_m.map_or(0.0, |off_m| {
-                (-0.5 * off_m.powi(2) / variance_m2).exp() / (TAU * variance_m2).sqrt()
+        let density = |left_m: Option<f64>| {
+            left_m.map_or(0.0, |left_m| {
+                (-0.5 * left_m.powi(2) / variance_m2).exp() / (TAU * variance_m2).sqrt()
             })
         };
-        let abreast = density(self.left_abreast_m(network, &mapped, settings));
-        let if_foreign = 0.5 * abreast + 0.25 / FOREIGN_SPAN_M;
-        let before = self.take_doubted(&mapped).map_or(FOREIGN, |of| of.foreign);
-        let [own, other] = [(1.0 - before) * density(off_m), before * if_foreign];
-        let foreign = other / (own + other);
-        self.log_probability += (own + other).ln();
-        // Others are as doubtful as any new one.
-        if foreign > FOREIGN {
-            let group = DoubtedGroup {
-                place: mapped,
-                foreign,
-            };
-            self.doubted_groups.push(group);
-        }
-        if let Some(off_m) = off_m.filter(|_| own > other) {
+        let density = GroupOf {
+            own: density(own_m),
+            abreast: density(abreast_m),
+            anywhere: 0.5 / ANYWHERE_M,
+        };
+        let (of, sum) = self.take_group(element, &mapped).after(&density);
+        self.log_probability += sum.ln();
+        self.balise_groups.push(BaliseGroup {
+            element,
+            place: mapped,
+            of,
+        });
+        let left_m = if of.own > of.abreast {
+            own_m
+        } else {
+            abreast_m
+        };
+        let left_m = left_m.filter(|_| of.own.max(of.abreast) > of.anywhere);
+        if let Some(left_m) = left_m {
             let across = self.covariance.column(PLACE).into_owned();
-            self.correct_by(&across, off_m, variance_m2);
+            self.correct_by(&across, left_m, variance_m2);
         }
+        left_m.is_some()
     }
 
-    /// What is known of the group of a balise, which is then no longer kept.
-    fn take_doubted(&mut self, mapped: &Point2<f64>) -> Option<DoubtedGroup> {
-        let mut groups = self.doubted_groups.iter();
-        let known = groups.position(|group| (group.place - mapped).norm() < GROUP_M)?;
-        Some(self.doubted_groups.swap_remove(known))
+    /// What is known of the group of a balise, which is then no longer kept; nor are those that are behind.
+    fn take_group(&mut self, element: usize, mapped: &Point2<f64>) -> GroupOf {
+        let away_m = |group: &BaliseGroup| (group.place - mapped).norm();
+        self.balise_groups.retain(|group| away_m(group) < BEHIND_M);
+        let mut groups = self.balise_groups.iter();
+        let known = groups.position(|of| of.element == element && away_m(of) < GROUP_M);
+        known.map_or(GroupOf::UNREAD, |k| self.balise_groups.swap_remove(k).of)
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests;

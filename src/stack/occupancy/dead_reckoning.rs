@@ -65,8 +65,6 @@ pub struct DeadReckoning {
     pub turned_rad: f64,
     /// Run since headings were compared, either way.
     pub since_heading_m: f64,
-    /// Run since the last fix, either way.
-    pub since_fix_m: f64,
 }
 
 impl DeadReckoning {
@@ -92,7 +90,6 @@ impl DeadReckoning {
         self.pending.seconds += seconds;
         self.run_m += run_m;
         self.since_heading_m += run_m.abs();
-        self.since_fix_m += run_m.abs();
         true
     }
 

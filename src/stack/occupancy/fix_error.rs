@@ -142,7 +142,8 @@ impl Hypothesis {
             let covariance_m2 = self.covariance.fixed_view::<4, 4>(FIX_ERROR, FIX_ERROR);
             self.kinds.push(KindError {
                 kind,
-                time: self.fix_time,
+                // The state's error has been carried on to now.
+                time: judged.fix.time,
                 error_m: self.slow_error_m(),
                 covariance_m2: covariance_m2.into_owned(),
             });

@@ -107,7 +107,6 @@ impl Hypothesis {
         let (mapped, forward) = self.course.at(network, self.place_m());
         let slow_m2 = slow_m2(covariance, &forward, settings);
         let ways = self.error_ways(judged, &slow_m2, settings);
-        self.fix_time = judged.fix.time;
         self.kind = Some(judged.kind);
         let place = mapped + self.shift_m() + left_of(&forward) * self.mean[ASIDE];
         let white = covariance * (1.0 - settings.correlated_share)
@@ -183,14 +182,15 @@ impl Hypothesis {
         both.max(wrong_log)
     }
 
-    /// Its slope is taken over one standard deviation of the place to both sides. So a kink at a mapped point hardly
+    /// Heading of the car on the map, where the antenna is at a place of its course. Its slope is taken over one standard deviation of the place to both sides. So a kink at a mapped point hardly
     /// counts as a curve, and where the heading does not turn evenly over that stretch, the difference counts as variance.
     pub fn mapped_heading(
         &self,
         network: &PlanNetwork,
+        place_m: f64,
         settings: &OccupancySettings,
     ) -> MappedHeading {
-        let (place_m, spread_m) = (self.place_m(), self.sigma_m().max(NEAR_M));
+        let spread_m = self.sigma_m().max(NEAR_M);
         let [behind, here, ahead] = [-spread_m, 0.0, spread_m]
             .map(|m| self.car_heading_rad(network, place_m + m, settings));
         let [to_here, to_ahead] = [here - behind, ahead - here].map(wrapped);

@@ -8,7 +8,6 @@
 use super::hypothesis::{Hypothesis, most_probable, wrapped};
 use super::map_error;
 use super::settings::OccupancySettings;
-use super::side_by_side::TrackPlacing;
 use crate::track::plan::PlanNetwork;
 use std::f64::consts::SQRT_2;
 
@@ -34,23 +33,19 @@ pub fn compare_headings(
         return;
     };
     let keep = (-run_m / (KEPT_LENGTHS * settings.map_correlation_m)).exp();
-    let mut references = hypotheses.iter();
-    let reference = references.find(|h| matches!(h.placing, TrackPlacing::Reference));
-    let of_reference = reference.map(|h| h.mapped_heading(network, settings));
-    let update = |hypothesis: &mut Hypothesis| {
-        let mapped = match (hypothesis.placing, of_reference) {
-            (TrackPlacing::Beside(_), Some(heading)) => heading,
-            _ => hypothesis.mapped_heading(network, settings),
-        };
+    let update = |hypotheses: &mut [Hypothesis], k: usize| {
+        let mapped = hypotheses[k].heading_beside(&hypotheses[most], network, settings);
+        let hypothesis = &mut hypotheses[k];
         let log = hypothesis.update_heading(&mapped, turned_rad, settings);
         hypothesis.heading_log = keep * hypothesis.heading_log + log;
         mapped.here_rad
     };
-    let most_rad = update(&mut hypotheses[most]);
+    let most_rad = update(hypotheses, most);
     let most_log = std::mem::take(&mut hypotheses[most].heading_log);
     let parted_rad = parted_rad(settings);
-    for (_, hypothesis) in (hypotheses.iter_mut().enumerate()).filter(|(k, _)| *k != most) {
-        let mapped_rad = update(hypothesis);
+    for k in (0..hypotheses.len()).filter(|k| *k != most) {
+        let mapped_rad = update(hypotheses, k);
+        let hypothesis = &mut hypotheses[k];
         hypothesis.heading_log -= most_log;
         if wrapped(mapped_rad - most_rad).abs() > parted_rad {
             hypothesis.log_probability += std::mem::take(&mut hypothesis.heading_log);

@@ -1,6 +1,6 @@
 //! One way that the train may have come and go, and where it then is.
 
-use super::balise::DoubtedGroup;
+use super::balise::BaliseGroup;
 use super::course::Course;
 use super::fix_error;
 use super::settings::OccupancySettings;
@@ -75,16 +75,14 @@ pub struct Hypothesis {
     pub covariance: StateCovariance,
     /// Of the last fix, what its error had of variance that changes with the surroundings, and that lasts.
     pub fix_variances_m2: [f64; 2],
-    /// When the last fix was.
-    pub fix_time: SimTime,
     /// Its kind.
     pub kind: Option<i32>,
     /// Whether its error had jumped.
     pub has_jumped: bool,
     /// Of the other kinds of fixes, as it was at the last one of each.
     pub kinds: Vec<KindError>,
-    /// Groups of balises that are foreign, if it is right.
-    pub doubted_groups: Vec<DoubtedGroup>,
+    /// Groups of balises that were read lately.
+    pub balise_groups: Vec<BaliseGroup>,
 }
 
 /// Error of fixes of a kind.

@@ -179,8 +179,7 @@ impl Occupancy {
         self.start(&judged);
         let (network, settings) = (&self.network, &self.settings);
         if settings.method == Method::Fused {
-            let run_m = std::mem::take(&mut self.reckoning.since_fix_m);
-            side_by_side::compare_distances(&mut self.hypotheses, network, run_m, settings);
+            side_by_side::compare_distances(&mut self.hypotheses, network, 0.0, settings);
         }
         for hypothesis in &mut self.hypotheses {
             match settings.method {
@@ -217,15 +216,18 @@ impl Occupancy {
         is_later
     }
 
-    /// Compares headings where enough was run since this was last done.
+    /// Compares distances and headings where enough was run since this was last done.
     fn after_run(&mut self) {
         if self.reckoning.since_heading_m < HEADING_EVERY_M {
             return;
         }
         let run_m = std::mem::take(&mut self.reckoning.since_heading_m);
         self.advance();
-        if self.reckoning.has_yaw_rate() && self.settings.method == Method::Fused {
-            let (network, settings) = (&self.network, &self.settings);
+        let (network, settings) = (&self.network, &self.settings);
+        if settings.method == Method::Fused {
+            side_by_side::compare_distances(&mut self.hypotheses, network, run_m, settings);
+        }
+        if self.reckoning.has_yaw_rate() && settings.method == Method::Fused {
             let turned = (self.reckoning.turned_rad, run_m);
             headings::compare_headings(&mut self.hypotheses, network, turned, settings);
             self.tidy();

@@ -8,6 +8,7 @@
 //! that one's heading. What is left is that distance itself, which is what tells the tracks. Where the map has them part, or
 //! nearer to each other than tracks can be, as legs behind a switch are, they are as mapped.
 
+use super::fused::MappedHeading;
 use super::headings;
 use super::hypothesis::{ASIDE, Hypothesis, left_of, most_probable};
 use super::settings::OccupancySettings;
@@ -126,6 +127,22 @@ impl Hypothesis {
         });
     }
 
+    /// The car's heading on its track, which is that of the reference abreast of its place if it is taken to lie beside it.
+    pub fn heading_beside(
+        &self,
+        reference: &Self,
+        network: &PlanNetwork,
+        settings: &OccupancySettings,
+    ) -> MappedHeading {
+        if !matches!(self.placing, TrackPlacing::Beside(_)) {
+            return self.mapped_heading(network, self.place_m(), settings);
+        }
+        let (place, _) = self.course.at(network, self.place_m());
+        let (of_reference, forward) = reference.course.at(network, reference.place_m());
+        let abreast_m = reference.place_m() + forward.dot(&(place - of_reference));
+        reference.mapped_heading(network, abreast_m, settings)
+    }
+
     /// Without moving its track in the world.
     fn set_placing(&mut self, placing: TrackPlacing, forward: &Vector2<f64>) {
         let before_m = self.shift_m();
@@ -144,69 +161,4 @@ impl Hypothesis {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
-mod tests {
-    use crate::bus::SimTime;
-    use crate::stack::occupancy::{Decision, Fix, Occupancy, OccupancySettings};
-    use crate::track::plan::{PlanNetwork, TrackElement};
-    use nalgebra::{Matrix2, Point2};
-
-    /// A run of 3 km at 20 m/s, with fixes so far to the left of x, on a map of two tracks with these places.
-    fn run(tracks_m: [fn(f64) -> f64; 2], beside_m: impl Fn(f64) -> f64) -> Decision {
-        let tracks = tracks_m.map(|y| {
-            let points =
-                (0..=150).map(|k| Point2::new(20.0 * f64::from(k), y(20.0 * f64::from(k))));
-            TrackElement::new("track", points.collect())
-        });
-        let network = PlanNetwork::new(None, tracks.into_iter().flatten().collect(), &[]);
-        let mut occupancy = Occupancy::new(network.into(), OccupancySettings::default());
-        for k in 1..740 {
-            let (time, x_m) = (SimTime::from_secs(0.2 * f64::from(k)), 4.0 * f64::from(k));
-            occupancy.on_speed(time, 20.0);
-            occupancy.on_fix(&Fix {
-                time,
-                place: Point2::new(x_m, beside_m(x_m)),
-                covariance_m2: Matrix2::identity(),
-            });
-        }
-        occupancy.decision()
-    }
-
-    /// By 0.4 m to both sides, once in 240 m.
-    fn wavy_m(x_m: f64) -> f64 {
-        0.4 * (x_m * std::f64::consts::TAU / 240.0).sin()
-    }
-
-    /// Fails where of two tracks, with fixes in the middle between them, the one that is mapped straight is taken for the
-    /// train's, or the one that is mapped with the waves that the fixes happen to have.
-    #[test]
-    fn what_a_map_has_wrong_of_a_distance_tells_no_track() {
-        for fixes in [
-            |_| 2.0,
-            |x_m| 2.0 + 0.5 * wavy_m(x_m),
-            |x_m| 2.0 + wavy_m(x_m),
-        ] {
-            let decision = run([|_| 0.0, |x_m| 4.0 + wavy_m(x_m)], fixes);
-            let least = decision
-                .tracks
-                .iter()
-                .map(|t| t.probability)
-                .fold(1.0, f64::min);
-            assert!(decision.tracks.len() == 2 && least > 0.1, "{decision:?}");
-        }
-    }
-
-    /// Fails where tracks that part slowly are held for parallel ones: from 4 to 16 m over 3 km, less than a map may have
-    /// wrong of headings.
-    #[test]
-    fn tracks_that_part_slowly_are_told() {
-        for (track, share) in [(0, 0.0), (1, 1.0)] {
-            let decision = run([|_| 0.0, |x_m| 4.0 + 0.004 * x_m], |x_m| {
-                share * (4.0 + 0.004 * x_m)
-            });
-            assert!(
-                decision.is_identified() && decision.tracks[0].element == track,
-                "{decision:?}"
-            );
-        }
-    }
-}
+mod tests;

@@ -7,7 +7,6 @@ use super::hypothesis::{Hypothesis, State, StateCovariance};
 use super::matching::{Match, by_pedal_curve};
 use super::side_by_side::TrackPlacing;
 use super::{Fix, Method, Occupancy};
-use crate::bus::SimTime;
 use crate::track::Direction;
 use crate::track::plan::ElementEnd;
 
@@ -111,19 +110,14 @@ impl Occupancy {
                 continue;
             };
             for way in [Direction::Up, Direction::Down] {
-                hypotheses.push(self.new_hypothesis(ElementEnd { element, way }, &found, fix.time));
+                hypotheses.push(self.new_hypothesis(ElementEnd { element, way }, &found));
             }
         }
         hypotheses
     }
 
     /// At a place of an element, with nothing known but that and the settings.
-    pub(super) fn new_hypothesis(
-        &self,
-        towards: ElementEnd,
-        found: &Match,
-        time: SimTime,
-    ) -> Hypothesis {
+    pub(super) fn new_hypothesis(&self, towards: ElementEnd, found: &Match) -> Hypothesis {
         let mut hypothesis = Hypothesis {
             course: Course::at_place(&self.network, towards, found.along_m),
             log_probability: 0.0,
@@ -132,11 +126,10 @@ impl Occupancy {
             mean: State::zeros(),
             covariance: StateCovariance::zeros(),
             fix_variances_m2: [0.0; 2],
-            fix_time: time,
             kind: None,
             has_jumped: false,
             kinds: Vec::new(),
-            doubted_groups: Vec::new(),
+            balise_groups: Vec::new(),
         };
         match self.settings.method {
             Method::Fused => {
