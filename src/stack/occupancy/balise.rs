@@ -7,6 +7,7 @@
 //! One group therefore says no more against a track than the probability of a foreign one, however many balises it has.
 
 use super::Occupancy;
+use super::balise_group::{BaliseGroup, FOREIGN, GroupOf};
 use super::hypothesis::{Hypothesis, PLACE};
 use super::matching::{Match, by_perpendicular};
 use super::settings::OccupancySettings;
@@ -16,11 +17,6 @@ use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix2, Point2};
 use std::f64::consts::TAU;
 
-/// Probability that a group of balises is not of the train's track: cross-talk (a balise 1.4 m beside the antenna must not
-/// be read, SUBSET-036), or a map with the group on a wrong track.
-const FOREIGN: f64 = 1e-6;
-/// Of these, the share that is from anywhere, and not from a track abreast.
-const FROM_ANYWHERE: f64 = 0.5;
 /// A track abreast is no farther away, metres.
 const ABREAST_M: f64 = 20.0;
 /// A balise from anywhere lies within so many metres before and behind the place of a hypothesis.
@@ -29,49 +25,6 @@ const ANYWHERE_M: f64 = 200.0;
 const GROUP_M: f64 = 15.0;
 /// A group that is farther away than this is behind the train: the next time it counts as any other, metres.
 const BEHIND_M: f64 = 100.0;
-
-/// A group of balises, if a hypothesis is right.
-#[derive(Clone, Copy, Debug)]
-pub struct BaliseGroup {
-    element: usize,
-    /// Of its last balise that was read, on the map.
-    place: Point2<f64>,
-    of: GroupOf,
-}
-
-/// Probabilities of what a group is: the train's own, of a track abreast, from anywhere.
-#[derive(Clone, Copy, Debug)]
-struct GroupOf {
-    own: f64,
-    abreast: f64,
-    anywhere: f64,
-}
-
-impl GroupOf {
-    /// Before one of its balises is read.
-    const UNREAD: Self = Self {
-        own: 1.0 - FOREIGN,
-        abreast: FOREIGN * (1.0 - FROM_ANYWHERE),
-        anywhere: FOREIGN * FROM_ANYWHERE,
-    };
-
-    /// After a reading that has these densities, and the density of the reading. No group is ever the train's own for certain,
-    /// or not.
-    fn after(&self, density: &Self) -> (Self, f64) {
-        let [own, abreast, anywhere] = [
-            self.own * density.own,
-            self.abreast * density.abreast,
-            self.anywhere * density.anywhere,
-        ];
-        let sum = own + abreast + anywhere;
-        let after = Self {
-            own: (own / sum).clamp(FOREIGN, 1.0 - FOREIGN),
-            abreast: abreast / sum,
-            anywhere: anywhere / sum,
-        };
-        (after, sum)
-    }
-}
 
 impl Occupancy {
     /// Takes in that the head passed over a balise at this place of an element.

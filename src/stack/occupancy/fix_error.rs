@@ -32,11 +32,6 @@ pub fn kept(seconds: f64, settings: &OccupancySettings) -> [f64; 2] {
     [settings.correlation_s, settings.lasting_s].map(|time_s| (-seconds / time_s).exp())
 }
 
-/// Error of a fix by its two parts.
-pub fn sum(parts_m: &Vector4<f64>) -> Vector2<f64> {
-    parts_m.fixed_rows::<2>(0) + parts_m.fixed_rows::<2>(2)
-}
-
 /// Covariance of the error of a fix by that of its two parts.
 pub fn sum_m2(parts_m2: &Matrix4<f64>) -> Matrix2<f64> {
     Matrix2::from_fn(|i, j| {

@@ -12,7 +12,7 @@ use super::fix_error::{self, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
     ASIDE, FIX_ERROR, HEADING, Hypothesis, NEAR_M, PLACE, SCALE, STATES, State, StateCovariance,
-    TURNED, YAW_OFFSET, left_of, log_sum, wrapped,
+    TURNED, YAW_OFFSET, left_of, log_sum, sum_of_parts, wrapped,
 };
 use super::map_error::{self, MapErrorChange};
 use super::settings::OccupancySettings;
@@ -108,7 +108,7 @@ impl Hypothesis {
         let slow_m2 = slow_m2(covariance, &forward, settings);
         let ways = self.error_ways(judged, &slow_m2, settings);
         self.kind = Some(judged.kind);
-        let place = mapped + self.shift_m() + left_of(&forward) * self.mean[ASIDE];
+        let place = mapped + self.placing.shift_m() + left_of(&forward) * self.mean[ASIDE];
         let white = covariance * (1.0 - settings.correlated_share)
             + Matrix2::identity() * LEAST_FIX_SIGMA_M.powi(2);
         let of_state = spread(&self.covariance, &forward);
@@ -116,7 +116,7 @@ impl Hypothesis {
         let found = ways.map(|way| {
             let of_error = if way.is_own { place_m2 } else { of_state };
             let spread = white + fix_error::sum_m2(&way.more_m2) + of_error;
-            let off = fix - place - fix_error::sum(&way.error_m);
+            let off = fix - place - sum_of_parts(&way.error_m);
             (way.probability.ln() + log_density(&off, &spread), spread)
         });
         let all = found.iter().map(|(log, _)| *log).reduce(log_sum);

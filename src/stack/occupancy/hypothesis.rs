@@ -1,10 +1,10 @@
 //! One way that the train may have come and go, and where it then is.
 
-use super::balise::BaliseGroup;
+use super::balise_group::BaliseGroup;
 use super::course::Course;
-use super::fix_error;
+use super::placing::TrackPlacing;
 use super::settings::OccupancySettings;
-use super::side_by_side::TrackPlacing;
+
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
@@ -52,6 +52,11 @@ pub fn wrapped(angle_rad: f64) -> f64 {
 /// The unit vector to the left of another one.
 pub fn left_of(forward: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-forward.y, forward.x)
+}
+
+/// Error of a fix by its two parts.
+pub fn sum_of_parts(parts_m: &Vector4<f64>) -> Vector2<f64> {
+    parts_m.fixed_rows::<2>(0) + parts_m.fixed_rows::<2>(2)
 }
 
 /// Number of the most probable one.
@@ -112,7 +117,7 @@ impl Hypothesis {
 
     /// Error of the fixes, if it is right.
     pub fn error_m(&self) -> Vector2<f64> {
-        fix_error::sum(&self.slow_error_m())
+        sum_of_parts(&self.slow_error_m())
     }
 
     /// Its two parts.

@@ -39,6 +39,7 @@
 //! ```
 
 mod balise;
+mod balise_group;
 mod course;
 mod dead_reckoning;
 mod decision;
@@ -51,6 +52,7 @@ mod hypothesis;
 mod map_error;
 mod matching;
 mod pedal;
+mod placing;
 mod settings;
 mod side_by_side;
 mod start;

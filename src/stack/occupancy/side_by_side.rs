@@ -11,6 +11,7 @@
 use super::fused::MappedHeading;
 use super::headings;
 use super::hypothesis::{ASIDE, Hypothesis, left_of, most_probable};
+use super::placing::{BesideReference, TrackPlacing};
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Point2, Vector2};
@@ -24,25 +25,6 @@ const SAME_HEADING: f64 = 0.5;
 /// Distances that differ from the mean by more standard deviations of their difference have really changed; tracks that
 /// are nearer to each other are legs of a switch.
 const CHANGED_SIGMAS: f64 = 3.0;
-
-/// Where the track of a hypothesis is taken to lie.
-#[derive(Clone, Copy, Debug, Default)]
-pub enum TrackPlacing {
-    #[default]
-    AsMapped,
-    /// As mapped: distances count from it.
-    Reference,
-    Beside(BesideReference),
-}
-
-/// At the mean distance from the reference.
-#[derive(Clone, Copy, Debug)]
-pub struct BesideReference {
-    /// To the left of the reference, the mean over the last run, metres.
-    mean_m: f64,
-    /// From the mapped place to there.
-    shift_m: Vector2<f64>,
-}
 
 /// The mapped place of the reference.
 struct MappedReference {
@@ -145,17 +127,9 @@ impl Hypothesis {
 
     /// Without moving its track in the world.
     fn set_placing(&mut self, placing: TrackPlacing, forward: &Vector2<f64>) {
-        let before_m = self.shift_m();
+        let before_m = self.placing.shift_m();
         self.placing = placing;
-        self.mean[ASIDE] -= left_of(forward).dot(&(self.shift_m() - before_m));
-    }
-
-    /// From its mapped place to where its track is taken to be.
-    pub fn shift_m(&self) -> Vector2<f64> {
-        match self.placing {
-            TrackPlacing::Beside(beside) => beside.shift_m,
-            TrackPlacing::AsMapped | TrackPlacing::Reference => Vector2::zeros(),
-        }
+        self.mean[ASIDE] -= left_of(forward).dot(&(self.placing.shift_m() - before_m));
     }
 }
 

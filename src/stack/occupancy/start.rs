@@ -5,7 +5,7 @@ use super::course::Course;
 use super::fix_trust::Judged;
 use super::hypothesis::{Hypothesis, State, StateCovariance};
 use super::matching::{Match, by_pedal_curve};
-use super::side_by_side::TrackPlacing;
+use super::placing::TrackPlacing;
 use super::{Fix, Method, Occupancy};
 use crate::track::Direction;
 use crate::track::plan::ElementEnd;
