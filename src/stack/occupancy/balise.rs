@@ -13,7 +13,7 @@ use super::matching::{Match, by_perpendicular};
 use super::settings::OccupancySettings;
 use crate::bus::SimTime;
 use crate::track::Direction;
-use crate::track::plan::{ElementEnd, PlanNetwork};
+use crate::track::plan::{ElementEnd, ElementPlace, PlanNetwork};
 use nalgebra::{Matrix2, Point2};
 use std::f64::consts::TAU;
 
@@ -21,19 +21,16 @@ use std::f64::consts::TAU;
 const ABREAST_M: f64 = 20.0;
 /// A balise from anywhere lies within so many metres before and behind the place of a hypothesis.
 const ANYWHERE_M: f64 = 200.0;
-/// Balises of a group are no farther from one to the next, metres: 12 m (SUBSET-040) and what a map may be off.
-const GROUP_M: f64 = 15.0;
 /// A group that is farther away than this is behind the train: the next time it counts as any other, metres.
 const BEHIND_M: f64 = 100.0;
 
 impl Occupancy {
-    /// Takes in that the head passed over a balise at this place of an element.
-    pub fn on_balise(&mut self, time: SimTime, (element, along_m): (usize, f64)) {
-        if element >= self.network.elements.len() || !self.run_to(time) {
+    /// Takes in that the head passed over a balise at this place.
+    pub fn on_balise(&mut self, time: SimTime, place: ElementPlace) {
+        if place.element >= self.network.elements.len() || !self.run_to(time) {
             return;
         }
         self.advance();
-        let place = (element, along_m);
         if self.hypotheses.is_empty() {
             self.start_at_balise(place);
         } else {
@@ -49,15 +46,15 @@ impl Occupancy {
     }
 
     /// On its track, or on one beside it if the balise is foreign, whichever way.
-    fn start_at_balise(&mut self, (element, along_m): (usize, f64)) {
-        self.add_at((element, along_m), 0.0);
-        let (place, _) = self.network.elements[element].at(along_m);
-        for other in self.network.near(&place, ABREAST_M) {
-            let all = [0.0, self.network.elements[other].length_m()];
+    fn start_at_balise(&mut self, balise: ElementPlace) {
+        self.add_at(balise, 0.0);
+        let (place, _) = self.network.elements[balise.element].at(balise.along_m);
+        for element in self.network.near(&place, ABREAST_M) {
+            let all = [0.0, self.network.elements[element].length_m()];
             let exact = Matrix2::identity();
-            let found = by_perpendicular(&self.network.elements[other], all, &place, &exact);
-            if let Some(found) = found.filter(|_| other != element) {
-                self.add_at((other, found.along_m), FOREIGN.ln());
+            let found = by_perpendicular(&self.network.elements[element], all, &place, &exact);
+            if let Some(Match { along_m, .. }) = found.filter(|_| element != balise.element) {
+                self.add_at(ElementPlace { element, along_m }, FOREIGN.ln());
             }
         }
         let foreign = GroupOf {
@@ -66,9 +63,9 @@ impl Occupancy {
             anywhere: 0.0,
         };
         for hypothesis in &mut self.hypotheses {
-            if hypothesis.towards().element != element {
+            if hypothesis.towards().element != balise.element {
                 hypothesis.balise_groups.push(BaliseGroup {
-                    element,
+                    element: balise.element,
                     place,
                     of: foreign,
                 });
@@ -76,7 +73,7 @@ impl Occupancy {
         }
     }
 
-    fn update_by_balise(&mut self, place: (usize, f64)) {
+    fn update_by_balise(&mut self, place: ElementPlace) {
         let (network, settings) = (&self.network, &self.settings);
         let mut of_most = (f64::NEG_INFINITY, false);
         for hypothesis in &mut self.hypotheses {
@@ -91,7 +88,8 @@ impl Occupancy {
     }
 
     /// Hypotheses with the head at a place, both ways.
-    fn add_at(&mut self, (element, along_m): (usize, f64), log_probability: f64) {
+    fn add_at(&mut self, place: ElementPlace, log_probability: f64) {
+        let ElementPlace { element, along_m } = place;
         let found = Match {
             along_m,
             away_m: 0.0,
@@ -110,19 +108,15 @@ impl Occupancy {
 impl Hypothesis {
     /// How far the train has to run until its head is at a place, below 0 if it is beyond; none where its course does
     /// not lead there.
-    fn left_m(
-        &self,
-        (element, along_m): (usize, f64),
-        settings: &OccupancySettings,
-    ) -> Option<f64> {
+    fn left_m(&self, to: ElementPlace, settings: &OccupancySettings) -> Option<f64> {
         let legs = self.course.legs().iter();
-        legs.filter(|leg| leg.towards.element == element)
-            .map(|leg| leg.course_m(along_m) - settings.antenna_behind_head_m - self.place_m())
+        legs.filter(|leg| leg.towards.element == to.element)
+            .map(|leg| leg.course_m(to.along_m) - settings.antenna_behind_head_m - self.place_m())
             .min_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
     /// Whether its course leads over a place that is no farther from the head than a foreign balise may be.
-    fn runs_over(&self, place: (usize, f64), settings: &OccupancySettings) -> bool {
+    fn runs_over(&self, place: ElementPlace, settings: &OccupancySettings) -> bool {
         self.left_m(place, settings)
             .is_some_and(|left_m| left_m.abs() < ANYWHERE_M)
     }
@@ -144,11 +138,12 @@ impl Hypothesis {
     fn update_balise(
         &mut self,
         network: &PlanNetwork,
-        (element, along_m): (usize, f64),
+        balise: ElementPlace,
         settings: &OccupancySettings,
     ) -> bool {
-        let (mapped, _) = network.elements[element].at(along_m);
-        let own_m = self.left_m((element, along_m), settings);
+        let element = balise.element;
+        let (mapped, _) = network.elements[element].at(balise.along_m);
+        let own_m = self.left_m(balise, settings);
         let abreast_m = self.left_abreast_m(network, &mapped, settings);
         let variance_m2 = self.covariance[(PLACE, PLACE)] + settings.balise_sigma_m.powi(2);
         let density = |left_m: Option<f64>| {
@@ -183,10 +178,10 @@ impl Hypothesis {
 
     /// What is known of the group of a balise, which is then no longer kept; nor are those that are behind.
     fn take_group(&mut self, element: usize, mapped: &Point2<f64>) -> GroupOf {
-        let away_m = |group: &BaliseGroup| (group.place - mapped).norm();
-        self.balise_groups.retain(|group| away_m(group) < BEHIND_M);
+        self.balise_groups
+            .retain(|group| (group.place - mapped).norm() < BEHIND_M);
         let mut groups = self.balise_groups.iter();
-        let known = groups.position(|of| of.element == element && away_m(of) < GROUP_M);
+        let known = groups.position(|group| group.has(element, mapped));
         known.map_or(GroupOf::UNREAD, |k| self.balise_groups.swap_remove(k).of)
     }
 }

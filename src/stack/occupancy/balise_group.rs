@@ -8,6 +8,9 @@ pub const FOREIGN: f64 = 1e-6;
 /// Of these, the share that is from anywhere, and not from a track abreast.
 const FROM_ANYWHERE: f64 = 0.5;
 
+/// Balises of a group are no farther from one to the next, metres: 12 m (SUBSET-040) and what a map may be off.
+const GROUP_M: f64 = 15.0;
+
 /// A group of balises, if a hypothesis is right.
 #[derive(Clone, Copy, Debug)]
 pub struct BaliseGroup {
@@ -23,6 +26,13 @@ pub struct GroupOf {
     pub own: f64,
     pub abreast: f64,
     pub anywhere: f64,
+}
+
+impl BaliseGroup {
+    /// Whether a balise of an element is one of it.
+    pub fn has(&self, element: usize, place: &Point2<f64>) -> bool {
+        self.element == element && (self.place - place).norm() < GROUP_M
+    }
 }
 
 impl GroupOf {

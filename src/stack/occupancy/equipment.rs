@@ -8,7 +8,7 @@ use crate::stack::Equipment;
 use crate::track::TrackId;
 use crate::track::geodesy::Datum;
 use crate::track::network::Network;
-use crate::track::plan::PlanNetwork;
+use crate::track::plan::{ElementPlace, PlanNetwork};
 use nalgebra::{Matrix2, Rotation2};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -26,8 +26,8 @@ pub struct TrackOccupancy {
     /// None of a map that is nowhere on the earth: fixes are then left out.
     datum: Option<Datum>,
     hold_s: f64,
-    /// By element and place along it.
-    balises: BTreeMap<String, (usize, f64)>,
+    /// By name.
+    balises: BTreeMap<String, ElementPlace>,
     /// Not yet taken in, by time, kind and order of arrival.
     waiting: BTreeMap<(SimTime, u8, u64), Input>,
     arrived: u64,
@@ -40,7 +40,7 @@ enum Input {
     /// Of a wheel that slides or slips.
     Slide(f64),
     YawRate(f64),
-    Balise(usize, f64),
+    Balise(ElementPlace),
     Fix(Fix),
 }
 
@@ -49,7 +49,7 @@ impl Input {
         match self {
             Self::Speed(_) | Self::Slide(_) => 0,
             Self::YawRate(_) => 1,
-            Self::Balise(..) => 2,
+            Self::Balise(_) => 2,
             Self::Fix(_) => 3,
         }
     }
@@ -66,7 +66,10 @@ impl TrackOccupancy {
         let tracks = map.tracks.iter().enumerate();
         let balises = tracks.flat_map(|(element, track)| {
             let places = track.balises.iter();
-            places.map(move |balise| (balise.name.clone(), (element, balise.chainage_m)))
+            places.map(move |balise| {
+                let along_m = balise.chainage_m;
+                (balise.name.clone(), ElementPlace { element, along_m })
+            })
         });
         Self {
             node,
@@ -92,7 +95,7 @@ impl TrackOccupancy {
             Input::Speed(speed_mps) => self.occupancy.on_speed(time, speed_mps),
             Input::Slide(speed_mps) => self.occupancy.on_slide(time, speed_mps),
             Input::YawRate(radps) => self.occupancy.on_yaw_rate(time, radps),
-            Input::Balise(element, along_m) => self.occupancy.on_balise(time, (element, along_m)),
+            Input::Balise(place) => self.occupancy.on_balise(time, place),
             Input::Fix(fix) => {
                 self.occupancy.on_fix(&fix);
                 return true;
@@ -161,8 +164,8 @@ impl Equipment for TrackOccupancy {
                 }
             }
             Content::BalisePassed(name) => {
-                if let Some((element, along_m)) = self.balises.get(name).copied() {
-                    self.wait(message.valid_at, Input::Balise(element, along_m));
+                if let Some(place) = self.balises.get(name).copied() {
+                    self.wait(message.valid_at, Input::Balise(place));
                 }
             }
             _ => {}

@@ -47,7 +47,7 @@ impl Hypothesis {
     /// Variances of a hypothesis about whose place nothing is known but the course.
     pub fn start_fused(&mut self, settings: &OccupancySettings, heading_offset_rad: f64) {
         let map = map_error::stationary(settings);
-        self.covariance = StateCovariance::zeros();
+        *self.covariance = StateCovariance::zeros();
         self.covariance[(PLACE, PLACE)] = NEW_PLACE_SIGMA_M.powi(2);
         self.covariance[(SCALE, SCALE)] = settings.speed_scale_sigma.powi(2);
         self.covariance[(YAW_OFFSET, YAW_OFFSET)] = settings.yaw_offset_sigma_radps.powi(2);
@@ -63,37 +63,25 @@ impl Hypothesis {
         self.mean[HEADING] = heading_offset_rad;
     }
 
-    /// Carries it on over a time in which so much was run, by the measured speed.
-    pub(super) fn advance_fused(&mut self, run: &TrainRun, settings: &OccupancySettings) {
-        let (seconds, run_m) = (run.seconds, run.length_m);
-        let keep = fix_error::kept(seconds, settings);
-        let map = MapErrorChange::over_run(run_m, settings);
-        let transition = Transition {
-            run_m,
-            seconds,
-            keep,
-            map: map.transition,
-        };
-        transition.apply(&mut self.mean);
-        self.mean[PLACE] += run_m;
+    /// Carries it on over a run.
+    pub(super) fn advance_fused(&mut self, advance: &Advance) {
+        advance.apply(&mut self.mean);
+        self.mean[PLACE] += advance.run_m;
         // The covariance is symmetric: F P F' = F (F P)'.
-        transition.apply(&mut self.covariance);
+        advance.apply(&mut *self.covariance);
         self.covariance.transpose_mut();
-        transition.apply(&mut self.covariance);
-        let moves = run_m.abs() > STANDING_MPS * seconds;
-        let speed_m2 = settings.speed_sigma_mps.powi(2) * seconds * SPEED_CORRELATION_S;
-        self.covariance[(PLACE, PLACE)] += if moves { speed_m2 } else { 0.0 } + run.unknown_m2;
-        self.covariance[(HEADING, HEADING)] +=
-            settings.yaw_rate_sigma_radps.powi(2) * seconds + run.unknown_rad2;
-        self.covariance[(YAW_OFFSET, YAW_OFFSET)] += YAW_OFFSET_DRIFT.powi(2) * seconds;
-        for (k, (keep, variance_m2)) in keep.iter().zip(self.fix_variances_m2).enumerate() {
-            let new_m2 = (1.0 - keep * keep) * variance_m2;
-            for axis in [FIX_ERROR + 2 * k, FIX_ERROR + 2 * k + 1] {
+        advance.apply(&mut *self.covariance);
+        self.covariance[(PLACE, PLACE)] += advance.new_place_m2;
+        self.covariance[(HEADING, HEADING)] += advance.new_heading_rad2;
+        self.covariance[(YAW_OFFSET, YAW_OFFSET)] += YAW_OFFSET_DRIFT.powi(2) * advance.seconds;
+        for (part, keep) in advance.keep.iter().enumerate() {
+            let new_m2 = (1.0 - keep * keep) * self.fix_variances_m2[part];
+            for axis in [FIX_ERROR + 2 * part, FIX_ERROR + 2 * part + 1] {
                 self.covariance[(axis, axis)] += new_m2;
             }
         }
         let mut of_map = self.covariance.fixed_view_mut::<2, 2>(ASIDE, ASIDE);
-        of_map += map.new;
+        of_map += advance.map.new;
     }
 
     /// Takes a fix in.
@@ -162,7 +150,7 @@ impl Hypothesis {
         measured[PLACE] = mapped.slope_radpm;
         measured[HEADING] = 1.0;
         measured[TURNED] = 1.0;
-        let across = self.covariance * measured.transpose();
+        let across = *self.covariance * measured.transpose();
         // The heading of a chord differs from that at its middle by an error that stays the same over the chord's length.
         // Headings are compared more often: for each its variance is so many times larger.
         let chord_rad2 =
@@ -204,22 +192,40 @@ impl Hypothesis {
     /// Kalman's update with one number: by how much it is off, its variance, and the state's covariance with it.
     pub fn correct_by(&mut self, across: &State, off: f64, variance: f64) {
         self.mean += across * (off / variance);
-        let left = self.covariance - across * across.transpose() / variance;
-        self.covariance = 0.5 * (left + left.transpose());
+        let left = *self.covariance - across * across.transpose() / variance;
+        *self.covariance = 0.5 * (left + left.transpose());
     }
 }
 
-/// How the state goes on; a unit matrix but for a few elements.
-struct Transition {
+/// How the states of all hypotheses go on over a run. The transition is a unit matrix but for a few elements.
+pub(super) struct Advance {
+    /// By the measured speed.
     run_m: f64,
     seconds: f64,
     /// Of the two parts of the error of fixes.
     keep: [f64; 2],
-    map: Matrix2<f64>,
+    map: MapErrorChange,
+    /// Variances of what is new.
+    new_place_m2: f64,
+    new_heading_rad2: f64,
 }
 
-impl Transition {
-    /// Multiplies columns by it, from the left.
+impl Advance {
+    pub fn over(run: &TrainRun, settings: &OccupancySettings) -> Self {
+        let (seconds, run_m) = (run.seconds, run.length_m);
+        let moves = run_m.abs() > STANDING_MPS * seconds;
+        let speed_m2 = settings.speed_sigma_mps.powi(2) * seconds * SPEED_CORRELATION_S;
+        Self {
+            run_m,
+            seconds,
+            keep: fix_error::kept(seconds, settings),
+            map: MapErrorChange::over_run(run_m, settings),
+            new_place_m2: if moves { speed_m2 } else { 0.0 } + run.unknown_m2,
+            new_heading_rad2: settings.yaw_rate_sigma_radps.powi(2) * seconds + run.unknown_rad2,
+        }
+    }
+
+    /// Multiplies columns by the transition, from the left.
     fn apply<const N: usize>(&self, columns: &mut SMatrix<f64, STATES, N>) {
         for mut state in columns.column_iter_mut() {
             state[PLACE] += self.run_m * state[SCALE];
@@ -227,9 +233,8 @@ impl Transition {
             for axis in 0..4 {
                 state[FIX_ERROR + axis] *= self.keep[axis / 2];
             }
-            let (aside, turned) = (state[ASIDE], state[TURNED]);
-            state[ASIDE] = self.map[(0, 0)] * aside + self.map[(0, 1)] * turned;
-            state[TURNED] = self.map[(1, 0)] * aside + self.map[(1, 1)] * turned;
+            let of_map = self.map.transition * Vector2::new(state[ASIDE], state[TURNED]);
+            (state[ASIDE], state[TURNED]) = (of_map.x, of_map.y);
         }
     }
 }

@@ -4,7 +4,6 @@ use super::balise_group::BaliseGroup;
 use super::course::Course;
 use super::placing::TrackPlacing;
 use super::settings::OccupancySettings;
-
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
@@ -35,8 +34,6 @@ pub type StateCovariance = SMatrix<f64, STATES, STATES>;
 const FAR_SIGMAS: f64 = 4.0;
 /// Places that are nearer to each other are not told apart, metres.
 pub const NEAR_M: f64 = 1.0;
-/// Hypotheses whose places are farther apart stay two.
-const MERGED_SIGMAS: f64 = 3.0;
 
 /// Logarithm of the sum of two numbers that are given by theirs.
 pub fn log_sum(a: f64, b: f64) -> f64 {
@@ -77,7 +74,8 @@ pub struct Hypothesis {
     pub heading_log: f64,
     pub placing: TrackPlacing,
     pub mean: State,
-    pub covariance: StateCovariance,
+    /// Boxed, because hypotheses are moved when they are sorted, branched and merged.
+    pub covariance: Box<StateCovariance>,
     /// Of the last fix, what its error had of variance that changes with the surroundings, and that lasts.
     pub fix_variances_m2: [f64; 2],
     /// Its kind.
@@ -127,8 +125,8 @@ impl Hypothesis {
 
     /// Whether all of it is numbers: what rounding has made of it otherwise is worth nothing.
     pub fn is_finite(&self) -> bool {
-        let all = self.mean.iter().chain(self.covariance.iter());
-        self.covariance[(PLACE, PLACE)] >= 0.0 && all.copied().all(f64::is_finite)
+        let sums = self.mean + self.covariance.column_sum();
+        self.covariance[(PLACE, PLACE)] >= 0.0 && sums.iter().all(|sum| sum.is_finite())
     }
 
     /// Heading of the leading car on the map, if the antenna is at a place.
@@ -145,79 +143,53 @@ impl Hypothesis {
     }
 
     /// From where to where the course is needed: the chord between the bogies, wherever the train may be.
-    fn needed_m(&self, settings: &OccupancySettings) -> [f64; 2] {
+    pub fn needed_m(&self, settings: &OccupancySettings) -> [f64; 2] {
         let bogies_m = settings.middle_ahead_of_antenna_m().abs() + 0.5 * settings.bogie_distance_m;
         let reach_m = bogies_m + NEAR_M + FAR_SIGMAS * self.sigma_m();
         let place_m = self.place_m();
         [place_m - reach_m, place_m + reach_m]
     }
 
-    /// The same with the course as long as it has to be, for each way that there is; the probability is shared
-    /// evenly.
-    pub fn grown(self, network: &PlanNetwork, settings: &OccupancySettings) -> Vec<Self> {
-        let (mut grown, mut left) = (Vec::new(), vec![self]);
-        while let Some(mut hypothesis) = left.pop() {
-            let needed = hypothesis.needed_m(settings);
-            let train = needed[0] - settings.train_length_m;
-            hypothesis.course.trim([train, needed[1]]);
-            let [begin_m, end_m] = hypothesis.course.stretch_m();
-            let longer = match (needed[1] > end_m, needed[0] < begin_m) {
-                (true, _) => hypothesis.course.onwards(network),
-                (false, true) => hypothesis.course.backwards(network),
-                (false, false) => Vec::new(),
-            };
-            let longer = match longer.is_empty() && needed[0] < begin_m {
-                // The network ends ahead, but not behind.
-                true => hypothesis.course.backwards(network),
-                false => longer,
-            };
-            if longer.is_empty() || grown.len() + left.len() > settings.most_hypotheses as usize {
+    /// Adds it to others with its course as long as it has to be, once for each way that there is; these share its
+    /// probability evenly.
+    pub fn grow_into(
+        self,
+        grown: &mut Vec<Self>,
+        network: &PlanNetwork,
+        settings: &OccupancySettings,
+    ) {
+        let most = grown.len() + settings.most_hypotheses as usize;
+        let (mut next, mut left) = (Some(self), Vec::new());
+        while let Some(mut hypothesis) = next {
+            let longer = hypothesis.lengthened(network, settings);
+            if longer.is_empty() || grown.len() + left.len() >= most {
                 grown.push(hypothesis);
-                continue;
+            } else {
+                let share = (longer.len() as f64).ln();
+                left.extend(longer.into_iter().map(|course| Self {
+                    course,
+                    log_probability: hypothesis.log_probability - share,
+                    ..hypothesis.clone()
+                }));
             }
-            let share = (longer.len() as f64).ln();
-            left.extend(longer.into_iter().map(|course| Self {
-                course,
-                log_probability: hypothesis.log_probability - share,
-                ..hypothesis.clone()
-            }));
+            next = left.pop();
         }
-        grown
     }
 
-    /// Takes in another one that says the same of all that is to come; whether it does.
-    pub fn merge(&mut self, other: &Self, settings: &OccupancySettings) -> bool {
-        let [leg, of_other] = [&*self, other].map(|h| *h.course.leg_at(h.place_m()));
-        if leg.towards != of_other.towards {
-            return false;
+    /// Cuts off what is no longer needed of its course. Gives the courses with one more element, if more is needed than
+    /// there is, for each way that there is; none at an end of the network.
+    fn lengthened(&mut self, network: &PlanNetwork, settings: &OccupancySettings) -> Vec<Course> {
+        let needed = self.needed_m(settings);
+        self.course
+            .trim([needed[0] - settings.train_length_m, needed[1]]);
+        let [begin_m, end_m] = self.course.stretch_m();
+        let mut longer = Vec::new();
+        if needed[1] > end_m {
+            longer = self.course.onwards(network);
         }
-        let mut mean = other.mean;
-        mean[PLACE] += leg.begin_m - of_other.begin_m;
-        let apart = mean - self.mean;
-        let spread_m = self.sigma_m().hypot(other.sigma_m()).max(NEAR_M);
-        let is_near = apart[PLACE].abs() < MERGED_SIGMAS * spread_m && apart[HEADING].abs() < 0.5;
-        let have_left = [&*self, other]
-            .iter()
-            .all(|h| h.needed_m(settings)[0] > h.course.leg_at(h.place_m()).begin_m);
-        let by_m = of_other.begin_m - leg.begin_m;
-        let same_course = self.course.is_shifted(&other.course, by_m);
-        let [ahead, of_other] = [&*self, other].map(|h| h.course.from(h.place_m()));
-        let same_ahead = ahead.is_shifted(&of_other, by_m);
-        if !is_near || !(same_course || (same_ahead && have_left)) {
-            return false;
+        if longer.is_empty() && needed[0] < begin_m {
+            longer = self.course.backwards(network);
         }
-        let [own, others] = [self.log_probability, other.log_probability];
-        let sum = log_sum(own, others);
-        let (own, others) = ((own - sum).exp(), (others - sum).exp());
-        self.log_probability = sum;
-        self.mean += apart * others;
-        self.covariance = self.covariance * own
-            + other.covariance * others
-            + apart * apart.transpose() * (own * others);
-        if !same_course {
-            // They came by different ways: where it would go back to is open.
-            self.course.trim([leg.begin_m + NEAR_M, f64::INFINITY]);
-        }
-        true
+        longer
     }
 }

@@ -51,6 +51,7 @@ mod headings;
 mod hypothesis;
 mod map_error;
 mod matching;
+mod merging;
 mod pedal;
 mod placing;
 mod settings;
@@ -69,6 +70,7 @@ use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use dead_reckoning::DeadReckoning;
 use fix_trust::{Circumstances, FixTrust};
+use fused::Advance;
 use hypothesis::Hypothesis;
 use nalgebra::{Matrix2, Point2};
 use std::sync::Arc;
@@ -246,21 +248,24 @@ impl Occupancy {
     fn advance(&mut self) {
         let run = self.reckoning.take_run();
         let speed_m2 = self.speed_filter.variance_m2(&run);
-        for hypothesis in &mut self.hypotheses {
-            match self.settings.method {
-                Method::Fused => hypothesis.advance_fused(&run, &self.settings),
-                _ => hypothesis.advance_by_speed(run.length_m, speed_m2),
+        if self.settings.method == Method::Fused {
+            let advance = Advance::over(&run, &self.settings);
+            for hypothesis in &mut self.hypotheses {
+                hypothesis.advance_fused(&advance);
+            }
+        } else {
+            for hypothesis in &mut self.hypotheses {
+                hypothesis.advance_by_speed(run.length_m, speed_m2);
             }
         }
     }
 
     fn grow(&mut self) {
-        let (network, settings) = (&self.network, &self.settings);
-        let grown = self
-            .hypotheses
-            .drain(..)
-            .flat_map(|h| h.grown(network, settings));
-        self.hypotheses = grown.collect();
+        let mut grown = Vec::with_capacity(self.hypotheses.len());
+        for hypothesis in self.hypotheses.drain(..) {
+            hypothesis.grow_into(&mut grown, &self.network, &self.settings);
+        }
+        self.hypotheses = grown;
     }
 
     /// Normalises, drops, branches and merges.
@@ -295,7 +300,7 @@ impl Occupancy {
                 .zip(&mut on)
                 .filter(|(_, on)| **on == towards);
             let merged = same.find_map(|(other, on)| {
-                let merges = other.merge(&hypothesis, &self.settings);
+                let merges = other.merge(&hypothesis, &self.network, &self.settings);
                 merges.then(|| *on = other.towards())
             });
             if merged.is_none() {

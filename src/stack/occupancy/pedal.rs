@@ -63,7 +63,7 @@ impl SpeedFilter {
 impl Hypothesis {
     /// At its match.
     pub fn start_matched(&mut self, found: &Match) {
-        self.covariance = StateCovariance::zeros();
+        *self.covariance = StateCovariance::zeros();
         self.covariance[(PLACE, PLACE)] = found.sigma_m.powi(2);
     }
 

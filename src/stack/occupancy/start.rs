@@ -110,7 +110,8 @@ impl Occupancy {
                 continue;
             };
             for way in [Direction::Up, Direction::Down] {
-                hypotheses.push(self.new_hypothesis(ElementEnd { element, way }, &found));
+                let hypothesis = self.new_hypothesis(ElementEnd { element, way }, &found);
+                hypotheses.push(hypothesis);
             }
         }
         hypotheses
@@ -124,7 +125,7 @@ impl Occupancy {
             heading_log: 0.0,
             placing: TrackPlacing::default(),
             mean: State::zeros(),
-            covariance: StateCovariance::zeros(),
+            covariance: Box::new(StateCovariance::zeros()),
             fix_variances_m2: [0.0; 2],
             kind: None,
             has_jumped: false,

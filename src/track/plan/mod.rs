@@ -59,6 +59,15 @@ pub struct ElementEnd {
     pub way: Direction,
 }
 
+/// A place of an element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElementPlace {
+    /// By number.
+    pub element: usize,
+    /// From its first point, metres.
+    pub along_m: f64,
+}
+
 /// Elements and their joints.
 #[derive(Clone, Debug)]
 pub struct PlanNetwork {

@@ -21,6 +21,10 @@ fn after_run(seconds: u32, beside_m: f64, sigma_m: f64) -> Occupancy {
     occupancy
 }
 
+fn on(element: usize, along_m: f64) -> ElementPlace {
+    ElementPlace { element, along_m }
+}
+
 /// Fails where a train that was put on a wrong track with certainty stays there although it reads two groups of balises
 /// of the other one; or where it leaves it for a single group, which may be foreign, however many balises that has.
 #[test]
@@ -35,7 +39,7 @@ fn two_groups_of_balises_refute_a_certainty() {
     let mut read = |farther_m: f64| {
         let time = SimTime::from_secs(199.0 + farther_m / 10.0);
         occupancy.on_speed(time, 10.0);
-        occupancy.on_balise(time, (0, antenna_m + 10.0 + farther_m));
+        occupancy.on_balise(time, on(0, antenna_m + 10.0 + farther_m));
         occupancy.decision()
     };
     for balise in 0..5 {
@@ -62,7 +66,7 @@ fn one_group_tells_no_more_than_that_it_may_be_foreign() {
             let farther_m = 6.0 + 3.0 * f64::from(balise);
             let time = SimTime::from_secs(99.0 + farther_m / 10.0);
             occupancy.on_speed(time, 10.0);
-            occupancy.on_balise(time, (0, 990.0 + 10.0 + farther_m));
+            occupancy.on_balise(time, on(0, 990.0 + 10.0 + farther_m));
             let decision = occupancy.decision();
             let doubt = 1.0 - decision.tracks[0].probability;
             assert!(decision.tracks[0].element == 0, "{decision:?}");
@@ -80,13 +84,13 @@ fn a_groups_place_is_taken_after_one_abreast_was_foreign() {
     let mut occupancy = after_run(200, 4.0, 0.3);
     let at = |second: f64| SimTime::from_secs(199.0 + second);
     occupancy.on_speed(at(0.6), 10.0);
-    occupancy.on_balise(at(0.6), (0, 2006.0));
+    occupancy.on_balise(at(0.6), on(0, 2006.0));
     for second in 1..60 {
         occupancy.on_slide(at(f64::from(second)), 0.0);
     }
     let before = occupancy.decision().tracks[0];
     assert!(before.element == 1 && before.sigma_m > 50.0, "{before:?}");
-    occupancy.on_balise(at(60.0), (1, 2007.0));
+    occupancy.on_balise(at(60.0), on(1, 2007.0));
     let after = occupancy.decision().tracks[0];
     assert!(after.element == 1 && after.sigma_m < 0.6, "{after:?}");
     assert!((after.along_m - 1997.0).abs() < 0.6, "{after:?}");

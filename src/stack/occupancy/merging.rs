@@ -1,0 +1,92 @@
+//! Two hypotheses that say the same of all that is to come are one.
+
+use super::balise_group::BaliseGroup;
+use super::hypothesis::{
+    ASIDE, HEADING, Hypothesis, KindError, NEAR_M, PLACE, State, left_of, log_sum,
+};
+use super::settings::OccupancySettings;
+use crate::track::plan::PlanNetwork;
+
+/// Hypotheses whose places are farther apart stay two.
+const MERGED_SIGMAS: f64 = 3.0;
+/// Headings that are farther apart are not those of one run, radians.
+const MERGED_RAD: f64 = 0.5;
+
+impl Hypothesis {
+    /// Takes in another one that says the same of all that is to come; whether it does.
+    pub fn merge(
+        &mut self,
+        other: &Self,
+        network: &PlanNetwork,
+        settings: &OccupancySettings,
+    ) -> bool {
+        let [leg, of_other] = [&*self, other].map(|h| *h.course.leg_at(h.place_m()));
+        if leg.towards != of_other.towards {
+            return false;
+        }
+        let by_m = of_other.begin_m - leg.begin_m;
+        let apart = self.apart(other, by_m, network);
+        let spread_m = self.sigma_m().hypot(other.sigma_m()).max(NEAR_M);
+        let is_near =
+            apart[PLACE].abs() < MERGED_SIGMAS * spread_m && apart[HEADING].abs() < MERGED_RAD;
+        if !is_near {
+            return false;
+        }
+        let is_same_course = self.course.is_shifted(&other.course, by_m);
+        if !is_same_course && !self.goes_on_as(other, by_m, settings) {
+            return false;
+        }
+        self.mix(other, &apart);
+        if !is_same_course {
+            // They came by different ways: where it would go back to is open.
+            self.course.trim([leg.begin_m + NEAR_M, f64::INFINITY]);
+        }
+        true
+    }
+
+    /// What the state of another one, whose course counts so much farther, has more than its own. How far the track lies
+    /// aside counts from where its own track is taken to lie.
+    fn apart(&self, other: &Self, by_m: f64, network: &PlanNetwork) -> State {
+        let mut apart = other.mean - self.mean;
+        apart[PLACE] -= by_m;
+        let (_, forward) = self.course.at(network, self.place_m());
+        let shift_m = other.placing.shift_m() - self.placing.shift_m();
+        apart[ASIDE] += left_of(&forward).dot(&shift_m);
+        apart
+    }
+
+    /// Whether both have left all that their courses have not in common.
+    fn goes_on_as(&self, other: &Self, by_m: f64, settings: &OccupancySettings) -> bool {
+        let have_left = [self, other]
+            .iter()
+            .all(|h| h.needed_m(settings)[0] > h.course.leg_at(h.place_m()).begin_m);
+        let [own, others] = [self, other].map(|h| h.course.from(h.place_m()));
+        have_left && own.is_shifted(&others, by_m)
+    }
+
+    /// Mean and covariance of the mixture. What only one of them knows of kinds of fixes and groups of balises, both know;
+    /// of what both know it is that of the first, the more probable one.
+    fn mix(&mut self, other: &Self, apart: &State) {
+        let [own, others] = [self.log_probability, other.log_probability];
+        let sum = log_sum(own, others);
+        let (own, others) = ((own - sum).exp(), (others - sum).exp());
+        self.log_probability = sum;
+        self.mean += apart * others;
+        *self.covariance = *self.covariance * own
+            + *other.covariance * others
+            + apart * apart.transpose() * (own * others);
+        let is_known = |new: &&KindError| self.kinds.iter().any(|known| known.kind == new.kind);
+        let new: Vec<_> = (other.kinds.iter().filter(|of| !is_known(of)).cloned()).collect();
+        self.kinds.extend(new);
+        let is_known = |new: &&BaliseGroup| {
+            (self.balise_groups.iter()).any(|known| known.has(new.element, &new.place))
+        };
+        let new: Vec<_> = (other
+            .balise_groups
+            .iter()
+            .filter(|of| !is_known(of))
+            .copied())
+        .collect();
+        self.balise_groups.extend(new);
+    }
+}
