@@ -21,6 +21,18 @@ pub(super) fn refuse_taken(path: &Path, option: &str, force: bool) -> Result<(),
     }
 }
 
+/// Whether two names are of one file, which need not be there.
+pub(super) fn is_same_file(a: &Path, b: &Path) -> bool {
+    let [a, b] = [a, b].map(|path| {
+        let folder = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        let folder = fs::canonicalize(folder.unwrap_or(Path::new(".")));
+        (folder.ok(), path.file_name())
+    });
+    a.0.is_some() && a == b
+}
+
 /// Writes a file: whole or not at all.
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
     let folder = path.parent().map_or(Ok(()), fs::create_dir_all);

@@ -5,9 +5,9 @@
 //! 3-D view follows.
 
 use super::images::WaysidePaths;
+use super::observer_error::{Result, failed};
 use super::recording_file::SIM_TIME;
 use super::stream::RowStream;
-use super::whole_files::{Result, failed};
 use super::{Contents, images, map, path_of, plots, scene, texts};
 use crate::bus::TrainId;
 use re_sdk_types::blueprint::archetypes::{

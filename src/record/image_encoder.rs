@@ -3,7 +3,7 @@
 //! They come back in the order in which they went in, each after a fixed number of others has gone in, so
 //! what a recording holds does not depend on how fast the thread is.
 
-use super::whole_files::{Result, failed};
+use super::observer_error::{Result, failed};
 use crate::bus::SimTime;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder as _};

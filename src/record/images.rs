@@ -4,9 +4,9 @@
 //! an image moves by half a pixel.
 
 use super::image_encoder::{Format, ImageEncoder, ImageRow};
+use super::observer_error::Result;
 use super::palette::{self, ui};
 use super::stream::RowStream;
-use super::whole_files::Result;
 use super::{path_of, slug};
 use crate::bus::{
     DangerLevel, DetectedObstacle, Ellipse, Frame, Intrinsics, LedReport, PixelBox, SimTime, Spot,

@@ -1,9 +1,9 @@
 //! The tracks and the trains on a map of the earth, for tunnels with a datum; with track occupancy also the last fix,
 //! its error ellipse and pedal curve, and every track that a train may be on.
 
+use super::observer_error::Result;
 use super::palette;
 use super::stream::RowStream;
-use super::whole_files::Result;
 use crate::bus::{GnssFix, OccupancyReport, SimTime, TrainId};
 use crate::track::geodesy::Datum;
 use crate::track::{Track, TrackId, Tunnel};

@@ -35,6 +35,7 @@ mod image_encoder;
 mod images;
 mod map;
 mod moving;
+mod observer_error;
 mod palette;
 pub mod parquet;
 mod plots;
@@ -44,7 +45,6 @@ mod stream;
 mod tables;
 mod template;
 mod texts;
-mod whole_files;
 
 pub(crate) use recording_file::names_of_recording;
 #[cfg(test)]
@@ -59,6 +59,7 @@ use images::Images;
 use map::Map;
 use moving::Moving;
 use nalgebra::Isometry3;
+use observer_error::Result;
 use plots::{Plots, RIG_CAMERA};
 use rerun::{SpawnError, SpawnOptions};
 use scene::RecordedScene;
@@ -67,7 +68,6 @@ use std::path::Path;
 use std::rc::Rc;
 use stream::{FLUSH_S, RowStream, Target};
 use texts::Texts;
-use whole_files::Result;
 
 /// Why there is no viewer.
 #[derive(Debug, thiserror::Error)]

@@ -1,9 +1,9 @@
 //! What moves in the 3-D view: train, cameras, obstacles, and where the stack takes them to be.
 
+use super::observer_error::{Result, failed};
 use super::palette::{self, ui};
 use super::scene::{HEAD, RecordedScene, turn};
 use super::stream::RowStream;
-use super::whole_files::{Result, failed};
 use super::{images, path_of, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime, TrainId};
 use crate::session::TrainOpening;

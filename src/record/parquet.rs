@@ -1,7 +1,8 @@
 //! Parquet tables whose columns say what they are: the same list makes the file and its
 //! description. Rows are anything that serialises to an object with the columns' names.
 
-use super::whole_files::{PartFile, Result, broken};
+use super::observer_error::{Result, broken};
+use crate::files::PartFile;
 use arrow::datatypes::{DataType, Field, Schema};
 use arrow::json::ReaderBuilder;
 use arrow::json::reader::Decoder;

@@ -1,7 +1,7 @@
 //! Series over time: speeds, position errors, vibration, distances.
 
+use super::observer_error::{Result, failed};
 use super::stream::RowStream;
-use super::whole_files::{Result, failed};
 use super::{Contents, palette, path_of, slug};
 use crate::bus::{
     DopplerSample, Frame, LedReport, Method, OccupancyReport, OdometerSample, ProtectionReport,

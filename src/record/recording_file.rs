@@ -3,7 +3,8 @@
 //! yet. Its end makes a file of it that is quick to look at: batches of some seconds, and an index. Both
 //! would be kept in memory if they were made on the way.
 
-use super::whole_files::{PartFile, Result, broken, make_folder_of, part_name};
+use super::observer_error::{Result, broken, make_folder_of};
+use crate::files::{PartFile, part_name};
 use rerun::external::re_log_encoding::{DecoderApp, EncodeError, Encoder, EncodingOptions};
 use rerun::log::{Chunk, LogMsg};
 use rerun::sink::{LogSink, SinkFlushError};

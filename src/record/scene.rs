@@ -1,9 +1,9 @@
 //! What stands still in the 3-D view: tunnel, rails, lamps, balises, wayside cameras.
 
 use super::images::{WaysidePaths, pinhole};
+use super::observer_error::Result;
 use super::palette::{self, ui};
 use super::stream::RowStream;
-use super::whole_files::Result;
 use crate::scenario::RecordSettings;
 use crate::session::Opening;
 use crate::track::network::Network;

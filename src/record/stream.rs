@@ -5,8 +5,8 @@
 //! time says, never by a timer. The sdk puts rows of one entity that hold different components
 //! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
+use super::observer_error::{Result, failed};
 use super::recording_file::{RecordingFile, SIM_TIME};
-use super::whole_files::{Result, failed};
 use crate::bus::SimTime;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
 use rerun::log::{ChunkBatcherConfig, TimeColumn};

@@ -1,7 +1,8 @@
 //! Tables for other programs.
 
-use super::whole_files::{PartFile, Result, broken, make_folder_of};
+use super::observer_error::{Result, broken, make_folder_of};
 use crate::bus::TrainId;
+use crate::files::PartFile;
 use crate::session::{Event, Observer, Opening};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};

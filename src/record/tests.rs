@@ -8,12 +8,12 @@
 
 pub(super) mod session;
 
-use super::whole_files::part_name;
 use super::{FixTable, Recording};
 use crate::bus::{
     Content, DangerLevel, DopplerSample, Message, Node, ObstacleWarning, OdometerSample, SimTime,
     TrainId,
 };
+use crate::files::part_name;
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::{TrackId, Tunnel};

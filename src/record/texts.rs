@@ -1,7 +1,7 @@
 //! The event log and the driver's display.
 
+use super::observer_error::Result;
 use super::stream::RowStream;
-use super::whole_files::Result;
 use super::{palette, path_of};
 use crate::bus::{
     BrakeDemand, CameraFault, DangerLevel, DriverDisplay, LedReport, Message, Node,

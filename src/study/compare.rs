@@ -36,6 +36,8 @@ pub struct Difference {
     pub mean: IntervalEstimate,
     /// Pairs that it is of.
     pub pairs: usize,
+    /// Pairs that are not in it because the figure is censored in one of both runs.
+    pub censored: usize,
 }
 
 /// Compares the studies of two folders.
@@ -60,18 +62,22 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
         let both = pairs
             .iter()
             .filter_map(|(a, b)| Some((a.ln_weight, of(b)? - of(a)?)));
-        let both: Vec<(f64, f64)> = both.filter(|(_, d)| d.is_finite()).collect();
+        let mut both: Vec<(f64, f64)> = both.collect();
+        // One of the pair is censored; where both are, the difference is no number.
+        let censored = both.iter().filter(|(_, d)| d.is_infinite()).count();
+        both.retain(|(_, d)| d.is_finite());
         let estimate = if weighted {
             weighted_mean(&both, bounds).filter(|_| sampled_otherwise == 0)
         } else {
             bounded_mean(&both.iter().map(|(_, d)| *d).collect::<Vec<_>>(), bounds)
         };
-        let differs = both.iter().any(|(_, d)| d.abs() > 0.0);
+        let differs = censored > 0 || both.iter().any(|(_, d)| d.abs() > 0.0);
         let estimate = estimate.filter(|_| differs);
         differences.extend(estimate.map(|mean| Difference {
             name: name.to_owned(),
             unit: unit.to_owned(),
             pairs: mean.n,
+            censored,
             mean,
         }));
     };

@@ -84,9 +84,9 @@ pub struct FigureDigest {
     pub runs: usize,
     /// How many numbers these runs have together: one of each, or all of each one's list.
     pub numbers: usize,
-    /// Of these, how many are infinite, because what they tell of never came about: they count in quantiles and for the
-    /// worst, and are not in the mean.
-    pub beyond: usize,
+    /// Of these, how many are censored, for what they tell of never came about in the run: as infinite ones they count in
+    /// quantiles and for the worst, and are not in the mean.
+    pub censored: usize,
     /// Their sum, of a figure that is a count.
     pub sum: Option<f64>,
     /// How many runs have it not, or only of a part of the run.
@@ -263,7 +263,7 @@ impl FigureDigest {
             measure,
             runs: lists.len(),
             numbers: count,
-            beyond: count - finite.iter().flatten().count(),
+            censored: count - finite.iter().flatten().count(),
             sum: (measure.kind == Kind::Int).then(|| numbers().sum()),
             lacking: rows.len() - lists.len(),
             worse_side: measure.worse_side(),
@@ -290,7 +290,7 @@ impl FigureDigest {
     }
 }
 
-/// Those numbers that are not beyond every number.
+/// Those numbers that are not censored.
 fn finite_of(numbers: &[f64]) -> Vec<f64> {
     let finite = numbers.iter().copied().filter(|x| x.is_finite());
     finite.collect()

@@ -1,7 +1,7 @@
 //! One run of a study, as a row of its results.
 
 use super::measures::{Fixes, MEASURES};
-use super::scale::count_beyond;
+use super::scale::count_censored;
 use crate::scenario::sampling::{SampleError, ScenarioSample};
 use crate::session::{End, Summary};
 use serde::{Deserialize, Serialize};
@@ -100,25 +100,25 @@ impl Row {
         }
     }
 
-    /// A variable or a figure as a number: flags are 0 and 1, and what never came about infinite.
+    /// A variable or a figure as a number: flags are 0 and 1, and what is censored, infinite.
     pub fn number(&self, name: &str) -> Option<f64> {
         match self.values.get(name).or_else(|| self.figures.get(name)) {
             Some(value) => value.as_f64().or_else(|| value.as_bool().map(f64::from)),
-            None => (self.beyond(name) > 0).then_some(f64::INFINITY),
+            None => (self.censored(name) > 0).then_some(f64::INFINITY),
         }
     }
 
-    /// A list of numbers, infinite those of what never came about.
+    /// A list of numbers, infinite those that are censored.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let list = self.figures.get(name).and_then(Value::as_array);
         let finite = list.into_iter().flatten().filter_map(Value::as_f64);
-        let beyond = std::iter::repeat_n(f64::INFINITY, self.beyond(name));
-        finite.chain(beyond).collect()
+        let censored = std::iter::repeat_n(f64::INFINITY, self.censored(name));
+        finite.chain(censored).collect()
     }
 
-    /// How many values of a figure are beyond every number.
-    fn beyond(&self, name: &str) -> usize {
-        let count = count_beyond(name).and_then(|count| self.figures.get(count)?.as_u64());
+    /// How many values of a figure are censored.
+    fn censored(&self, name: &str) -> usize {
+        let count = count_censored(name).and_then(|count| self.figures.get(count)?.as_u64());
         count.unwrap_or(0) as usize
     }
 

@@ -31,16 +31,16 @@ const NEUTRAL: [&str; 9] = [
     "_frames",
 ];
 
-/// Figures of something that may never come about, and the count of how often it did not: so many of their values are
-/// beyond every number.
-const BEYOND: [(&str, &str); 2] = [
+/// Figures of something that may not come about in a run, and the count of how often it did not: so many of their values
+/// are censored.
+const CENSORED: [(&str, &str); 2] = [
     ("occupancy_identified_max_m", "occupancy_never_identified"),
     ("occupancy_leg_m", "occupancy_never_identified"),
 ];
 
-/// The name of the count of values of a figure that are beyond every number.
-pub(super) fn count_beyond(name: &str) -> Option<&'static str> {
-    let of = BEYOND.iter().find(|(figure, _)| *figure == name);
+/// The name of the count of values of a figure that are censored.
+pub(super) fn count_censored(name: &str) -> Option<&'static str> {
+    let of = CENSORED.iter().find(|(figure, _)| *figure == name);
     of.map(|(_, count)| *count)
 }
 
@@ -139,7 +139,7 @@ mod tests {
         for end in ends.chain(&SIGNED) {
             assert!(MEASURES.iter().any(|m| m.name.ends_with(end)), "{end}");
         }
-        for name in BEYOND.iter().flat_map(|(figure, count)| [figure, count]) {
+        for name in CENSORED.iter().flat_map(|(figure, count)| [figure, count]) {
             assert!(MEASURES.iter().any(|m| m.name == *name), "{name}");
         }
     }

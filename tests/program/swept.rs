@@ -124,14 +124,17 @@ fn what_never_came_about_is_farther_than_any_number() {
     leave(&base, &rows);
     let report = run(&format!("study report {}", base.display()));
     succeeds(&report);
-    says(&report, "2 of 20 never, counted as inf and not in the mean");
+    says(
+        &report,
+        "2 of 20 censored (counted as inf, not in the mean)",
+    );
     says(&report, "3 of 40 never");
     let page = fs::read_to_string(base.join("report.html")).unwrap();
     assert!(page.contains("40, 3 never"), "{page}");
     fs::remove_dir_all(base).ok();
     let of_name = |f: &&FigureDigest| f.measure.name == "occupancy_identified_max_m";
     let most = digest.figures.iter().find(of_name).unwrap();
-    assert_eq!((most.runs, most.lacking, most.beyond), (20, 0, 2));
+    assert_eq!((most.runs, most.lacking, most.censored), (20, 0, 2));
     assert!((most.mean.unwrap().value - 18.5).abs() < 1e-9);
     let worst = most.worst.unwrap();
     assert!(worst.value.is_infinite() && worst.index == 18);
@@ -141,7 +144,7 @@ fn what_never_came_about_is_farther_than_any_number() {
     let mut by_rail = digest.swept[0].figures.iter();
     let legs = by_rail.find(|f| f.name == "occupancy_leg_m");
     let legs = &legs.unwrap().values[0].digest;
-    assert_eq!((legs.runs, legs.numbers, legs.beyond), (20, 40, 3));
+    assert_eq!((legs.runs, legs.numbers, legs.censored), (20, 40, 3));
     let expected_m = (2.0 * (0..18).map(known_m).sum::<f64>() + known_m(18)) / 37.0;
     assert!((legs.mean.unwrap().value - expected_m).abs() < 1e-9);
     let finite = legs.quantiles.map(|q| q.unwrap().value.is_finite());

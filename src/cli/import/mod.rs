@@ -1,19 +1,19 @@
 //! `metrotwin import`: tunnel files from maps and tables of others.
 
+mod csv;
 mod told;
+mod value;
 
-use super::check::read_as;
 use super::fault::Failure;
-use super::map::{read_map, read_osm, read_railml_map, refused};
+use super::map::{read_map, read_osm, read_railml_map};
 use super::print;
-use super::result_file::{refuse_taken, write_whole};
-use crate::settings::ReadLimit;
+use super::result_file::{is_same_file, refuse_taken, write_whole};
 use crate::track::geodesy::Geodetic;
 use crate::track::import::railml::RailMlOptions;
-use crate::track::import::{
-    AroundPlace, Crs, ImportedMap, LayingOptions, TableImport, TableOptions,
-};
+use crate::track::import::{AroundPlace, Crs, ImportedMap, LayingOptions};
+use csv::{AFTER_CSV, CsvArgs, csv};
 use std::path::{Path, PathBuf};
+use value::{metres, place, sigma};
 
 const AFTER_OSM: &str = "\
 FILE is raw JSON of the Overpass API (`out body` with the nodes), or OSM XML as the map's export gives it. To get all
@@ -32,38 +32,6 @@ who publishes what is made of them must say so. The written file does in its fir
 Examples:
   metrotwin import osm tracks.json --out out/town.toml
   metrotwin import osm city.osm --around 48.2085,15.6240 --radius-m 700 --out out/station.toml";
-
-const AFTER_CSV: &str = "\
-FILE has a row for each element of the alignment, in order, and one for the end of the line:
-
-  chainage_m;element;radius_m;turn;cant_mm;grade_permille
-  12000,0;straight;;;;-3,0
-  12150,0;clothoid;;;;
-  12200,0;arc;500,0;right;60;
-  12400,0;clothoid;;;;
-  12450,0;straight;;;;2,0
-  12700,0;end;;;;
-
-chainage_m         where the element begins, as the office states it
-radius_m           of an arc; empty, 0 or inf: straight
-turn               left or right, looking up the line; without this column a negative radius turns right
-element            straight, arc or clothoid; without this column what has a radius is an arc. A clothoid runs from the
-                   curvature before to that after it
-length_m           of the element; needed in the last row, if that is not the end of the line
-cant_mm            of an arc; or cant_m, in metres
-grade_permille     from here on, rising positive; empty: as before; or grade_percent, or grade_ratio (1:40, or -1:40 where
-                   the line falls)
-vertical_radius_m  of the curve that leads into the grade; default 3000
-
-Columns may stand in any order, with `,`, `;` or tabs between them; with `;` or tabs numbers may have a decimal comma.
-A table of lamps has the columns chainage_m, number (or uid, as 1-023), and, if there are any, lateral_m (left of the
-track positive), height_m, aim_yaw_deg, power_w. The line lies in a circular tunnel, or with --open all of it in the open;
-other sections, balises, stations and so on are added to the written file by hand.
-
-Examples:
-  metrotwin import csv alignment.csv --out out/line.toml
-  metrotwin import csv alignment.csv --lamps lamps.csv --line-number 1 --datum 30.657,104.066 --heading-deg 90 \\
-    --out out/line.toml";
 
 const AFTER_RAILML: &str = "\
 Read are infrastructure and topology of railML 2.x and 3.x. Taken over: tracks, as curves near their coordinates;
@@ -118,97 +86,16 @@ impl Written {
         refuse_ending(&self.out)?;
         refuse_taken(&self.out, "--out", self.force)?;
         match &self.report {
-            Some(report) if *report == self.out => Err(Failure::input(
-                format!("{} is named by --out and by --report", self.out.display()),
-                "give them two names",
-            )),
+            Some(report) if *report == self.out || is_same_file(report, &self.out) => {
+                Err(Failure::input(
+                    format!("{} is named by --out and by --report", self.out.display()),
+                    "give them two names",
+                ))
+            }
             Some(report) => refuse_taken(report, "--report", self.force),
             None => Ok(()),
         }
     }
-}
-
-#[derive(clap::Args)]
-struct CsvArgs {
-    /// Table of the alignment
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
-    /// Tunnel file to be written
-    #[arg(long, value_name = "TUNNEL")]
-    out: PathBuf,
-    /// Write over a file that is there
-    #[arg(long)]
-    force: bool,
-    /// Table of lamps
-    #[arg(long, value_name = "LAMPS")]
-    lamps: Option<PathBuf>,
-    /// First part of the lamps' UIDs
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=15))]
-    line_number: u8,
-    /// Where the line begins on the earth, degrees
-    #[arg(long, value_name = "LAT,LON", value_parser = place, allow_hyphen_values = true)]
-    datum: Option<Geodetic>,
-    /// Its direction there, degrees from east towards north
-    #[arg(long, value_name = "H", default_value_t = 0.0, value_parser = heading, allow_hyphen_values = true)]
-    heading_deg: f64,
-    /// The line lies in the open, not in a tunnel
-    #[arg(long)]
-    open: bool,
-}
-
-fn csv(args: &CsvArgs) -> Result<(), Failure> {
-    refuse_ending(&args.out)?;
-    refuse_taken(&args.out, "--out", args.force)?;
-    let alignment = read_as(&args.file, ReadLimit::CSV)?;
-    let lamps = args
-        .lamps
-        .as_ref()
-        .map(|path| read_as(path, ReadLimit::CSV));
-    let lamps = lamps.transpose()?;
-    let options = TableOptions {
-        name: name_of(&args.out),
-        line_number: args.line_number,
-        datum: args.datum,
-        heading_deg: args.heading_deg,
-        is_open: args.open,
-    };
-    let import = TableImport::read(&alignment, lamps.as_deref(), &options).map_err(|fault| {
-        let path = match &args.lamps {
-            Some(lamps) if fault.is_of_lamps => lamps,
-            _ => &args.file,
-        };
-        refused(
-            path,
-            &fault,
-            "see `metrotwin import csv --help` for the columns",
-        )
-    })?;
-    let names = [Some(&args.file), args.lamps.as_ref()]
-        .into_iter()
-        .flatten();
-    let names: Vec<String> = names.map(|path| told::file_name(path)).collect();
-    let comment = format!("By `metrotwin import csv` from {}.", names.join(" and "));
-    let text = import.file.to_text(&[comment]).map_err(Failure::run)?;
-    write_whole(&args.out, &text)?;
-    for header in &import.unknown {
-        eprintln!("left out: column `{header}`: it means nothing here");
-    }
-    print(&format!(
-        "{}: {:.3} m, {} elements, {} grades, {} lamps; {}",
-        args.out.display(),
-        import.length_m,
-        import.file.plan.len(),
-        import.file.grades.len(),
-        import.file.lamp.len(),
-        match args.open {
-            true => "in the open",
-            false => "in a tunnel (--open: in the open)",
-        }
-    ))
-}
-
-fn heading(text: &str) -> Result<f64, String> {
-    number(text, -360.0, 360.0)
 }
 
 #[derive(clap::Args)]
@@ -330,40 +217,4 @@ fn name_of(out: &Path) -> String {
         "" => "imported".to_owned(),
         name => name.to_owned(),
     }
-}
-
-fn place(text: &str) -> Result<Geodetic, String> {
-    let numbers: Vec<f64> = text
-        .split(',')
-        .filter_map(|part| part.trim().parse().ok())
-        .collect();
-    match numbers[..] {
-        [latitude_deg, longitude_deg]
-            if latitude_deg.abs() <= 85.0 && longitude_deg.abs() <= 180.0 =>
-        {
-            Ok(Geodetic {
-                latitude_deg,
-                longitude_deg,
-                height_m: 0.0,
-            })
-        }
-        _ => Err("give latitude and longitude in degrees, as in 48.2085,15.6240".to_owned()),
-    }
-}
-
-fn metres(text: &str) -> Result<f64, String> {
-    number(text, 1.0, 1e6)
-}
-
-fn sigma(text: &str) -> Result<f64, String> {
-    number(text, 0.01, 10.0)
-}
-
-fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    let number = text
-        .trim()
-        .parse()
-        .ok()
-        .filter(|m| (least..=most).contains(m));
-    number.ok_or_else(|| format!("give a number from {least} to {most}"))
 }

@@ -1,6 +1,7 @@
 //! Files of a data set.
 
-use crate::record::whole_files::{PartFile, Result, broken, write_whole};
+use crate::files::{PartFile, write_whole};
+use crate::record::observer_error::{Result, broken};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType};
 use std::io::{self, BufWriter, Write};

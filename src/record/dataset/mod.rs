@@ -53,8 +53,9 @@ pub use plan::{FramePlan, LabelKind, LabelKinds, UnknownLabel};
 
 use crate::bus::TrainId;
 use crate::files::Listing;
+use crate::files::write_whole;
+use crate::record::observer_error::{Result, broken, failed};
 use crate::record::parquet::{Column, ParquetTable};
-use crate::record::whole_files::{Result, broken, failed, write_whole};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::{Inputs, complete, sha256};
 use crate::session::{self, Event, Exposure, Observer, Opening, Source, TrainPoint};

@@ -7,7 +7,7 @@ use super::frame::{FrameRow, ImageRow};
 use super::lamps::LampRow;
 use super::obstacles::{self, ObstacleRow};
 use super::{DataSet, ExposedFrame, LabelKind};
-use crate::record::whole_files::{Result, failed};
+use crate::record::observer_error::{Result, failed};
 use crate::session::Source;
 use crate::track::Place;
 use crate::twin::physics::BodyOwner;

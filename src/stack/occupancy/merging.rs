@@ -90,3 +90,61 @@ impl Hypothesis {
         self.balise_groups.extend(new);
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::bus::SimTime;
+    use crate::stack::occupancy::balise_group::GroupOf;
+    use crate::stack::occupancy::placing::{BesideReference, TrackPlacing};
+    use crate::stack::occupancy::{Fix, Occupancy, OccupancySettings};
+    use crate::track::plan::TrackElement;
+    use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
+
+    /// Fails where merging moves a track in the world because one hypothesis has it as mapped and the other one at a mean
+    /// distance from another track, or forgets what only one of both knows of a kind of fixes or a group of balises.
+    #[test]
+    fn both_know_what_one_knew() {
+        let points = [0.0, 1000.0].map(|x| Point2::new(x, 0.0));
+        let track = TrackElement::new("track", points.into()).unwrap();
+        let network = PlanNetwork::new(None, vec![track], &[]);
+        let settings = OccupancySettings::default();
+        let mut occupancy = Occupancy::new(network.clone().into(), settings);
+        occupancy.on_speed(SimTime::ZERO, 10.0);
+        occupancy.on_fix(&Fix {
+            time: SimTime::ZERO,
+            place: Point2::new(500.0, 0.0),
+            covariance_m2: Matrix2::identity(),
+        });
+        let mut mapped = occupancy.hypotheses[0].clone();
+        let mut beside = mapped.clone();
+        beside.placing = TrackPlacing::Beside(BesideReference {
+            mean_m: 4.2,
+            shift_m: Vector2::new(0.0, 0.3),
+        });
+        beside.mean[ASIDE] = mapped.mean[ASIDE] - left_of(&Vector2::x()).y * 0.3;
+        beside.kinds = vec![KindError {
+            kind: 7,
+            time: SimTime::ZERO,
+            error_m: Vector4::zeros(),
+            covariance_m2: Matrix4::identity(),
+        }];
+        beside.balise_groups = vec![BaliseGroup {
+            element: 0,
+            place: Point2::new(490.0, 0.0),
+            of: GroupOf::UNREAD,
+        }];
+        let before = mapped.clone();
+        assert!(mapped.merge(&beside, &network, &settings));
+        assert!((mapped.mean - before.mean).norm() < 1e-12);
+        assert!((*mapped.covariance - *before.covariance).norm() < 1e-9 * before.covariance.norm());
+        let same_log = before.log_probability + 2f64.ln();
+        assert!((mapped.log_probability - same_log).abs() < 1e-12);
+        assert_eq!(mapped.kinds.len(), before.kinds.len() + 1);
+        assert_eq!(mapped.balise_groups.len(), 1);
+        assert!(mapped.merge(&beside, &network, &settings));
+        assert_eq!(mapped.balise_groups.len(), 1);
+        assert_eq!(mapped.kinds.len(), before.kinds.len() + 1);
+    }
+}

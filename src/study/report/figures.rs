@@ -153,16 +153,16 @@ fn label(measure: &Measure) -> String {
     }
 }
 
-/// How many runs a plot of a figure lacks, and in how many it is beyond every number.
+/// How many runs a plot of a figure lacks, and in how many it is censored.
 fn without(figure: &FigureDigest) -> String {
     let (lacking, runs) = (figure.lacking, figure.runs + figure.lacking);
     let lacking = match lacking {
         0 => String::new(),
         _ => format!(", without {lacking} of {runs} runs that lack it"),
     };
-    match figure.beyond {
+    match figure.censored {
         0 => lacking,
-        never => format!("{lacking}, in {never} never"),
+        censored => format!("{lacking}, {censored} censored"),
     }
 }
 
@@ -247,7 +247,7 @@ fn distribution(figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
     let measure = figure.measure;
     let mut sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
     sample.sort_by(f64::total_cmp);
-    // Those beyond every number are not below any.
+    // Censored ones are not below any value.
     let n = sample.len() as f64;
     sample.retain(|x| x.is_finite());
     let share = |k: usize| k as f64 / n;

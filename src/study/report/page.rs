@@ -141,7 +141,7 @@ mod tests {
             measure: measure("stop_error_m").unwrap(),
             runs: 3,
             numbers: 3,
-            beyond: 0,
+            censored: 0,
             sum: None,
             lacking: 0,
             worse_side: WorseSide::Farther,

@@ -1,6 +1,5 @@
-//! Files as observers write them: an error says what was being done.
+//! Errors of observers: each says what was being done.
 
-pub(super) use crate::files::{PartFile, part_name, write_whole};
 use crate::session::ObserverError;
 use std::error::Error;
 use std::fs;
