@@ -10,8 +10,9 @@
 
 use super::{
     CameraStatus, DopplerSample, Frame, GnssFix, ImuSample, LedReport, LidarScan, ObstacleWarning,
-    OccupancyReport, OdometerSample, PositionEstimate, ProtectionReport, RigCalibration, SimTime,
-    StereoPair, TrainCommand, TrainId, TrainReport, WaysideCalibration, WaysideReport,
+    OccupancyReport, OdometerSample, PositionEstimate, ProtectionReport, RadarFrame, RadarReport,
+    RadarSheet, RigCalibration, SimTime, StereoPair, TrainCommand, TrainId, TrainReport,
+    WaysideCalibration, WaysideReport,
 };
 use serde::{Deserialize, Serialize};
 
@@ -99,10 +100,14 @@ pub enum Content {
     Frame(Frame),
     /// A sweep of a lidar.
     Scan(LidarScan),
+    /// A frame of a radar.
+    RadarFrame(RadarFrame),
     /// The antenna passed over the balise of this name.
     BalisePassed(String),
     /// The calibration sheet of a stereo rig.
     RigCalibration(RigCalibration),
+    /// The sheet of a radar.
+    RadarSheet(RadarSheet),
     /// The calibration sheet of a wayside device.
     WaysideCalibration(WaysideCalibration),
     /// What was read from a stereo pair.
@@ -113,6 +118,8 @@ pub enum Content {
     Occupancy(OccupancyReport),
     /// What was found in a wayside frame.
     Wayside(WaysideReport),
+    /// What was found in a radar's frame.
+    Radar(RadarReport),
     /// State of a camera that delivers no frames.
     Camera(CameraStatus),
     /// A wayside device warns, or takes a warning back.
