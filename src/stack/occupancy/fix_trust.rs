@@ -91,8 +91,7 @@ impl FixTrust {
         let is_near = at.away_m <= REFUTED_SIGMAS * sigma_m;
         let seen = self.kinds.get(&number).copied();
         let before = seen.unwrap_or(KindTrust::unseen(fix, at, sigma_m));
-        let gone_m = (at.run_m - before.at.run_m).abs();
-        let left_m = before.floor_m * (-gone_m / before.trust_m).exp();
+        let left_m = before.floor_left_m(&at);
         let floor_m = if is_near {
             left_m
         } else {
@@ -100,16 +99,14 @@ impl FixTrust {
         };
         let has_jumped = seen.is_none() || before.has_jumped(fix, &at, sigma_m);
         let off_since = before.off_since.or(has_jumped.then_some(fix.time));
-        let off_since =
-            off_since.filter(|since| floor_m > left_m && fix.time.since(*since) <= REFLECTION_S);
+        let is_off = |since: &SimTime| floor_m > left_m && fix.time.since(*since) <= REFLECTION_S;
+        let off_since = off_since.filter(is_off);
         if off_since.is_some() {
-            self.kinds.insert(
-                number,
-                KindTrust {
-                    off_since,
-                    ..before
-                },
-            );
+            let kind = KindTrust {
+                off_since,
+                ..before
+            };
+            self.kinds.insert(number, kind);
             return None;
         }
         let believed_m = sigma_m.hypot(floor_m);
@@ -119,10 +116,10 @@ impl FixTrust {
             at,
             off_since,
             floor_m,
-            trust_m: match is_near {
-                true if has_jumped => TRUST_AFTER_JUMP_M,
-                true => before.trust_m,
-                false => TRUST_M,
+            trust_m: match (is_near, has_jumped) {
+                (true, true) => TRUST_AFTER_JUMP_M,
+                (true, false) => before.trust_m,
+                (false, _) => TRUST_M,
             },
             drawn_sigma_m: if is_new {
                 believed_m
@@ -131,9 +128,10 @@ impl FixTrust {
             },
         };
         self.kinds.insert(number, kind);
+        let covariance_m2 = fix.covariance_m2 + Matrix2::identity() * floor_m.powi(2);
         Some(Judged {
             fix: Fix {
-                covariance_m2: fix.covariance_m2 + Matrix2::identity() * floor_m.powi(2),
+                covariance_m2,
                 ..*fix
             },
             kind: number,
@@ -153,6 +151,12 @@ impl KindTrust {
             trust_m: TRUST_M,
             drawn_sigma_m: sigma_m,
         }
+    }
+
+    /// What is left of the least error that it is taken to have.
+    fn floor_left_m(&self, at: &Circumstances) -> f64 {
+        let gone_m = (at.run_m - self.at.run_m).abs();
+        self.floor_m * (-gone_m / self.trust_m).exp()
     }
 
     /// Whether a fix cannot be the same solution as the last one.

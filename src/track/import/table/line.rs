@@ -51,48 +51,19 @@ impl TableLine {
         };
         for (k, row) in rows.iter().enumerate() {
             let at_m = row.needed("chainage_m")?;
-            let given_m = row.number("length_m")?;
-            let next_m = rows
-                .get(k + 1)
-                .map(|next| next.needed("chainage_m"))
-                .transpose()?;
             if let Some(grade) = grade(row, rounded(at_m - begin_m, 6))? {
                 line.add_grade(row.line, grade);
             }
-            let length_m = match (next_m, given_m) {
-                (Some(next_m), None) => next_m - at_m,
-                (Some(next_m), Some(given_m)) if (next_m - at_m - given_m).abs() > SAME_M => {
-                    let what = format!(
-                        "is {given_m} m, and the next row begins {:.3} m farther",
-                        next_m - at_m
-                    );
-                    return Err(row.wrong(
-                        "length_m",
-                        what,
-                        "let both agree: jumps of the chainage are not read",
-                    ));
-                }
-                (_, Some(given_m)) => given_m,
-                (None, None) if is_end(row) => continue,
-                (None, None) => {
-                    let what = "the last row has no length".to_owned();
-                    return Err(row.row_wrong(what, "give `length_m`, or add a row with nothing but the chainage of the line's end"));
-                }
+            let Some(length_m) = element_length_m(row, at_m, rows.get(k + 1))? else {
+                continue;
             };
-            if length_m.is_nan() || length_m <= 0.0 {
-                let what = format!("the next row begins {length_m:.3} m farther");
-                return Err(row.wrong("chainage_m", what, "let chainages grow from row to row"));
-            }
-            let length_m = rounded(length_m, 6);
             line.length_m += length_m;
-            line.plan.push((
-                row.line,
-                PlanEntry {
-                    length_m,
-                    closes: false,
-                    shape: shape(row, sheet)?,
-                },
-            ));
+            let entry = PlanEntry {
+                length_m,
+                closes: false,
+                shape: shape(row, sheet)?,
+            };
+            line.plan.push((row.line, entry));
         }
         match line.plan.is_empty() {
             true => Err(last.row_wrong(
@@ -201,6 +172,37 @@ impl SheetRow<'_> {
             )),
         }
     }
+}
+
+/// Length of the element of a row, to the next row or as given; none of a row that only ends the line.
+fn element_length_m(
+    row: &SheetRow<'_>,
+    at_m: f64,
+    next: Option<&SheetRow<'_>>,
+) -> Result<Option<f64>, SheetError> {
+    let given_m = row.number("length_m")?;
+    let next_m = next.map(|next| next.needed("chainage_m")).transpose()?;
+    let length_m = match (next_m.map(|next_m| next_m - at_m), given_m) {
+        (Some(to_next_m), Some(given_m)) if (to_next_m - given_m).abs() > SAME_M => {
+            let what = format!("is {given_m} m, and the next row begins {to_next_m:.3} m farther");
+            let remedy = "let both agree: jumps of the chainage are not read";
+            return Err(row.wrong("length_m", what, remedy));
+        }
+        (_, Some(given_m)) => given_m,
+        (Some(to_next_m), None) => to_next_m,
+        (None, None) if is_end(row) => return Ok(None),
+        (None, None) => {
+            let what = "the last row has no length".to_owned();
+            let remedy =
+                "give `length_m`, or add a row with nothing but the chainage of the line's end";
+            return Err(row.row_wrong(what, remedy));
+        }
+    };
+    if length_m.is_nan() || length_m <= 0.0 {
+        let what = format!("the next row begins {length_m:.3} m farther");
+        return Err(row.wrong("chainage_m", what, "let chainages grow from row to row"));
+    }
+    Ok(Some(rounded(length_m, 6)))
 }
 
 /// A row with nothing but the chainage of the end.
