@@ -12,6 +12,7 @@ pub mod occupancy;
 mod odometry;
 pub mod positioning;
 pub mod protection;
+pub mod protection_level;
 mod runs;
 pub mod wayside;
 
