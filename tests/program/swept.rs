@@ -128,7 +128,7 @@ fn what_never_came_about_is_farther_than_any_number() {
         &report,
         "2 of 20 censored (counted as inf, not in the mean)",
     );
-    says(&report, "3 of 40 never");
+    says(&report, "3 of 40 censored");
     let page = fs::read_to_string(base.join("report.html")).unwrap();
     assert!(page.contains("40, 3 never"), "{page}");
     fs::remove_dir_all(base).ok();
