@@ -5,6 +5,7 @@
 //! Each part is [`Equipment`] of a train or a wayside post.
 
 pub mod camera_watch;
+pub mod combined;
 mod equipment;
 mod history;
 pub mod led;

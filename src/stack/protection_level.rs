@@ -14,6 +14,8 @@
 
 use std::f64::consts::SQRT_2;
 
+/// A level over this is none, metres.
+const MOST_M: f64 = 1e12;
 /// The level is found to this share of it.
 const EXACT: f64 = 1e-9;
 
@@ -67,13 +69,13 @@ pub fn protection_level_m(fault_free: &EstimateBound, faults: &[FaultMode], risk
     };
     let is_over = |level_m: f64| over(level_m) > risk;
     let mut most_m = fault_free.bias_m + fault_free.sigma_m;
-    while is_over(most_m) {
+    while most_m < MOST_M && is_over(most_m) {
         most_m *= 2.0;
-        if !(most_m < 1e12) {
-            return f64::INFINITY;
-        }
     }
-    bisect(is_over, most_m)
+    match most_m < MOST_M {
+        true => bisect(is_over, most_m),
+        false => f64::INFINITY,
+    }
 }
 
 /// Where something that is so from 0 on stops being so, before a number.

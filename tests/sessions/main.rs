@@ -12,6 +12,7 @@
 mod common;
 
 mod calibration;
+mod combined;
 mod determinism;
 mod fault_matrix;
 mod faults;
