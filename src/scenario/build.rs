@@ -89,6 +89,7 @@ impl OnboardSettings {
             imu: file.imu,
             odometer: file.odometer,
             doppler: file.doppler,
+            radar: file.radar.clone(),
             gnss: file.gnss,
             led: file.stack.led.clone(),
             occupancy: file.stack.occupancy,
