@@ -5,9 +5,10 @@
 //! frequencies differ by what our filter lets through, 0 to the sample rate. Where the slopes differ, our samples meet a
 //! short sweep through all beats: it raises the noise of some chirps, as is seen of cars that meet (Brooker, "Mutual
 //! interference of millimeter-wave radar systems", IEEE Trans. EMC 49(1), 2007). Where slope, start and clock are the same,
-//! it is a tone like an echo's, at half the distance and with an echo's phase from receiver to receiver: a ghost.
+//! it is a tone in every chirp, at half the distance: a ghost over all speeds, since each of their chirps begins with a phase of
+//! its own.
 //!
-//! Each of their chirps begins with a phase of its own. Not modelled: their echoes from walls, and what drives our receiver
+//! Not modelled: their echoes from walls, and what drives our receiver
 //! beyond its straight range.
 
 use super::converter::counts_of;

@@ -7,10 +7,13 @@
 //! [`BeatModel::reference`] computes that sample by sample.
 //!
 //! **As a product of matrices.** Within a chirp the phase is straight to some 1e-4 cycles, so its samples are
-//! a e_n(t) with the amplitude a of the chirp's middle and the beat's tone e_n. Over a few loops the tone is nearly the
-//! same for all chirps and channels. So for each few loops: samples = tones (2 samples x 2 echoes, real) times amplitudes
-//! (2 echoes x chirps and channels), with phases in double and the product in single precision. What is left is the drift
-//! of the tone over these loops: an error of 43 dB below an echo of 39 m/s at the ends of a chirp, less for slower ones.
+//! a e(t) with the amplitude a of the chirp's middle and the beat's tone e, which is 1 there. Over a few loops the tone is
+//! nearly the same for all chirps and channels. With x(t) from -1 to 1 over a chirp, and q the phase by which the tone of one
+//! chirp and channel is ahead of the common one at its end, samples are a e(t) (1 + i q x(t)), but for q^2 / 2. So for each
+//! few loops: samples = tones (e and x e of all echoes) times amplitudes (a and i q a of all chirps and channels), with
+//! phases in double and the product in single precision. For 39 m/s at the edge of the view q is 25 mrad at most. Against the
+//! model, the power of all error is 103 dB below standing echoes, 86 dB below echoes of up to 10 m/s, 74 dB below those of up
+//! to 39 m/s.
 //!
 //! Blocks of loops are computed on all cores; each is the same whatever their number.
 
@@ -18,10 +21,11 @@ use crate::bus::{RadarSheet, RadarWaveform};
 use nalgebra::{Complex, DMatrix, Point3, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 pub(super) const LIGHT_MPS: f64 = 299_792_458.0;
 /// Loops that have one tone for an echo.
-const LOOPS_TOGETHER: usize = 4;
+const LOOPS_TOGETHER: usize = 8;
 /// Samples of a tone that are advanced together.
 const LANES: usize = 8;
 
@@ -138,10 +142,10 @@ impl BeatModel<'_> {
     }
 
     /// The samples of a few loops.
-    fn block(&self, echoes: &[Echo], loops: std::ops::Range<usize>, samples: &mut [Complex<f32>]) {
+    fn block(&self, echoes: &[Echo], loops: Range<usize>, samples: &mut [Complex<f32>]) {
         let count = self.figures.waveform.samples as usize;
         let middle_s = 0.5 * (self.chirp_s(loops.start, 0) + self.chirp_s(loops.end, 0));
-        let product = self.tones(echoes, middle_s) * self.amplitudes(echoes, loops);
+        let product = self.tones(echoes, middle_s) * self.amplitudes(echoes, loops, middle_s);
         for (column, chirp) in product.column_iter().zip(samples.chunks_mut(count)) {
             let (real, imaginary) = column.as_slice().split_at(count);
             for ((sample, re), im) in chirp.iter_mut().zip(real).zip(imaginary) {
@@ -150,23 +154,39 @@ impl BeatModel<'_> {
         }
     }
 
-    /// In column n the tone of echo n about the chirp's middle, real parts over imaginary ones; as many columns later the
-    /// same times i.
+    /// Four columns of an echo, real parts over imaginary ones: its tone e about the chirp's middle, i e, x e and i x e.
     fn tones(&self, echoes: &[Echo], at_s: f64) -> DMatrix<f32> {
         let count = self.figures.waveform.samples as usize;
-        let mut tones = DMatrix::zeros(2 * count, 2 * echoes.len());
-        for (n, echo) in echoes.iter().enumerate() {
-            let [re, im] = self.tone(echo, at_s);
-            let mut column = tones.column_mut(n);
-            column.rows_mut(0, count).copy_from_slice(&re);
-            column.rows_mut(count, count).copy_from_slice(&im);
-            let mut turned = tones.column_mut(echoes.len() + n);
-            turned.rows_mut(count, count).copy_from_slice(&re);
-            for (to, from) in turned.rows_mut(0, count).iter_mut().zip(&im) {
-                *to = -from;
+        let mut tones = DMatrix::zeros(2 * count, 4 * echoes.len());
+        let along: Vec<f32> = (0..count).map(|k| self.along(k) as f32).collect();
+        let columns = tones.as_mut_slice().chunks_exact_mut(2 * count);
+        let mut columns = columns.map(|column| column.split_at_mut(count));
+        for echo in echoes {
+            let mut parts = self.tone(echo, at_s);
+            for _ in 0..2 {
+                let [re, im] = &parts;
+                if let (Some(plain), Some(turned)) = (columns.next(), columns.next()) {
+                    plain.0.copy_from_slice(re);
+                    plain.1.copy_from_slice(im);
+                    turned
+                        .0
+                        .iter_mut()
+                        .zip(im)
+                        .for_each(|(to, from)| *to = -from);
+                    turned.1.copy_from_slice(re);
+                }
+                for part in &mut parts {
+                    part.iter_mut().zip(&along).for_each(|(part, x)| *part *= x);
+                }
             }
         }
         tones
+    }
+
+    /// Where a sample is in its chirp, from -1 at the first one to 1.
+    fn along(&self, sample: usize) -> f64 {
+        let last = f64::from(self.figures.waveform.samples.max(2) - 1);
+        2.0 * sample as f64 / last - 1.0
     }
 
     /// Real and imaginary parts of an echo's tone over a chirp, 1 at its middle.
@@ -200,37 +220,47 @@ impl BeatModel<'_> {
         parts
     }
 
-    /// In each column those of a chirp and receiver, real parts over imaginary ones.
-    fn amplitudes(&self, echoes: &[Echo], loops: std::ops::Range<usize>) -> DMatrix<f32> {
-        let (figures, waveform) = (self.figures, &self.figures.waveform);
+    /// In each column those of a chirp and receiver: four rows of an echo, a and i q a, each real part over imaginary one.
+    fn amplitudes(&self, echoes: &[Echo], loops: Range<usize>, tones_s: f64) -> DMatrix<f32> {
+        let figures = self.figures;
         let (senders, receivers) = (
             elements(&figures.transmitters_m),
             elements(&figures.receivers_m),
         );
-        let (chirp, a_loop) = (receivers.len(), figures.channels());
-        let mut amplitudes = DMatrix::zeros(2 * echoes.len(), loops.len() * a_loop);
-        let middle_s = middle_s(waveform);
-        for (row, column) in loops.clone().zip(0..).map(|(l, k)| (l, k * a_loop)) {
-            for (k, sender) in senders.iter().enumerate() {
-                let at_s = self.chirp_s(row, k) + middle_s;
-                let column = column + k * chirp;
-                for (n, echo) in echoes.iter().enumerate() {
-                    let (out, back) = (echo.out.after(at_s), echo.back.after(at_s));
-                    let out_m = (out - sender).norm();
-                    for (r, receiver) in receivers.iter().enumerate() {
-                        let way_m = out_m + (back - receiver).norm();
-                        let turns = cycles(waveform, way_m / LIGHT_MPS, middle_s);
-                        let phase = (TAU * turns.fract() + echo.phase_rad) as f32;
-                        let (sin, cos) = phase.sin_cos();
-                        let channel = self.channels[k * chirp + r] * echo.amplitude;
-                        let (re, im) = (channel.re as f32, channel.im as f32);
-                        amplitudes[(n, column + r)] = re * cos - im * sin;
-                        amplitudes[(echoes.len() + n, column + r)] = re * sin + im * cos;
-                    }
+        let mut amplitudes = DMatrix::zeros(4 * echoes.len(), loops.len() * figures.channels());
+        let middle_s = middle_s(&figures.waveform);
+        let tones_m: Vec<f64> = (echoes.iter())
+            .map(|echo| echo.out.range(tones_s)[0] + echo.back.range(tones_s)[0])
+            .collect();
+        let turn_m = TAU * figures.waveform.slope_hzps * middle_s / LIGHT_MPS;
+        let chirps = loops.flat_map(|l| (0..senders.len()).map(move |k| (l, k)));
+        for (chirp, (a_loop, k)) in chirps.enumerate() {
+            let at_s = self.chirp_s(a_loop, k) + middle_s;
+            for (n, echo) in echoes.iter().enumerate() {
+                let (out, back) = (echo.out.after(at_s), echo.back.after(at_s));
+                let out_m = (out - senders[k]).norm();
+                for (r, receiver) in receivers.iter().enumerate() {
+                    let way_m = out_m + (back - receiver).norm();
+                    let channel = self.channels[k * receivers.len() + r] * echo.amplitude;
+                    let [re, im] = self.turned(channel, way_m, echo.phase_rad);
+                    let ahead = (turn_m * (way_m - tones_m[n])) as f32;
+                    let mut rows = amplitudes.column_mut(chirp * receivers.len() + r);
+                    let mut rows = rows.rows_mut(4 * n, 4);
+                    (rows[0], rows[1]) = (re, im);
+                    (rows[2], rows[3]) = (-ahead * im, ahead * re);
                 }
             }
         }
         amplitudes
+    }
+
+    /// An amplitude with the phase of the beat in a chirp's middle.
+    fn turned(&self, amplitude: Complex<f64>, way_m: f64, phase_rad: f64) -> [f32; 2] {
+        let waveform = &self.figures.waveform;
+        let turns = cycles(waveform, way_m / LIGHT_MPS, middle_s(waveform));
+        let (sin, cos) = ((TAU * turns.fract() + phase_rad) as f32).sin_cos();
+        let (re, im) = (amplitude.re as f32, amplitude.im as f32);
+        [re * cos - im * sin, re * sin + im * cos]
     }
 }
 

@@ -344,7 +344,7 @@ fn a_near_train_drives_the_converter_to_its_ends() {
             train_slope_deg: 3.0,
             ..BodyEchoSettings::default()
         },
-        full_scale_dbm: -60.0,
+        full_scale_dbm: -72.0,
         ..plain()
     };
     let near = world(

@@ -1,6 +1,7 @@
 //! Scattering centres of bodies: trains, obstacles, people.
 //!
-//! **Obstacles** echo by the pieces of their surface ([`super::facet`]); the material gives reflectivity (permittivities of
+//! **Obstacles** echo by the pieces of their surface ([`super::facet`]), the smaller the nearer, for only what a lobe lights
+//! glints; the material gives reflectivity (permittivities of
 //! Recommendation ITU-R P.2040: concrete 5.24, wood 1.99; polyethylene 2.3; cardboard, mostly air, 1.3).
 //!
 //! **Vehicles.** Pieces as well, with panels that bend (slopes of 12 deg) and in sum so much that the mean over the
@@ -19,7 +20,7 @@
 
 use super::Centre;
 use super::facet::{Facet, Surface, reflectivity_of};
-use super::shapes::facets;
+use super::shapes::{facets, piece_m};
 use crate::settings::settings;
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::physics::{BodyOwner, ObstacleMaterial};
@@ -101,7 +102,7 @@ impl BodyEchoes {
 
     /// Mean over the azimuth of a passenger car, by the pieces of its box.
     fn car_mean_m2(&self) -> f64 {
-        let car = facets(&Shape::Box(CAR_HALF_M.into()));
+        let car = facets(&Shape::Box(CAR_HALF_M.into()), f64::INFINITY);
         let surface = self.surface(ObstacleMaterial::Vehicle);
         let steps = 720;
         let sections = (0..steps).map(|k| {
@@ -184,7 +185,10 @@ impl BodyEchoes {
     fn pieces(&self, seen: &SeenBody<'_>, surface: &Surface, radar: &Point3<f64>) -> Vec<Centre> {
         let pose = seen.body.world_from_body;
         let at = pose.inverse_transform_point(radar);
-        let all = facets(&seen.body.shape).into_iter().zip(0..);
+        let half = seen.body.shape.half_extents_m();
+        let nearest = at.coords.zip_map(&half, |x, half| x.max(-half).min(half));
+        let piece_m = piece_m(surface.slope_rad, (at.coords - nearest).norm());
+        let all = facets(&seen.body.shape, piece_m).into_iter().zip(0..);
         let met = all.filter_map(|(facet, number): (Facet, u64)| {
             let towards = (at - facet.place).try_normalize(1e-9)?;
             let section_m2 = facet.section_m2(&towards, surface, self.wave_m);
@@ -208,7 +212,7 @@ impl BodyEchoes {
                 let [from_end, beside, below] = BOGIE_M;
                 let along = (half.x - from_end).max(0.0);
                 let bogie = Point3::new(way * along, side * beside, -half.z - below);
-                let number = 1 << 16 | 2 * k + number;
+                let number = (1 << 16) | (2 * k + number);
                 centres.push(self.centre(seen, pose * bogie, self.settings.bogie_m2, number));
             }
         }

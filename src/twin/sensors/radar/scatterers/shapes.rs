@@ -5,15 +5,23 @@ use crate::twin::geometry::{Hull, Shape};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};
 
-/// Faces of boxes are cut into pieces no longer than this.
+/// Faces of boxes are cut into pieces no longer than this, or a half or a quarter of it.
 const PIECE_M: f64 = 1.5;
+const HALVINGS: u32 = 2;
 /// Flat pieces around something round.
 const AROUND: u32 = 12;
 
-/// The pieces of a shape, in its own axes.
-pub fn facets(shape: &Shape) -> Vec<Facet> {
+/// How long pieces may be for a radar so far away: what a lobe of their slopes lights, as near as there are sizes.
+pub fn piece_m(slope_rad: f64, away_m: f64) -> f64 {
+    let lit_m = 2.0 * slope_rad * away_m;
+    let halved = (0..HALVINGS).take_while(|k| PIECE_M / f64::from(1 << k) > lit_m);
+    PIECE_M / f64::from(1 << halved.count())
+}
+
+/// The pieces of a shape, in its own axes; those of boxes no longer than a size.
+pub fn facets(shape: &Shape, piece_m: f64) -> Vec<Facet> {
     match shape {
-        Shape::Box(half) => box_facets(half),
+        Shape::Box(half) => box_facets(half, piece_m),
         Shape::Sphere(radius) => ball_facets(*radius, 0.0),
         Shape::Cylinder(radius, half) => {
             let mut facets = tube_facets(*radius, *half);
@@ -34,11 +42,11 @@ pub fn facets(shape: &Shape) -> Vec<Facet> {
     }
 }
 
-fn box_facets(half: &Vector3<f64>) -> Vec<Facet> {
+fn box_facets(half: &Vector3<f64>, piece_m: f64) -> Vec<Facet> {
     let mut facets = Vec::new();
     for axis in 0..3 {
         let (across, up) = ((axis + 1) % 3, (axis + 2) % 3);
-        let pieces = [across, up].map(|side| (2.0 * half[side] / PIECE_M).ceil().clamp(1.0, 64.0));
+        let pieces = [across, up].map(|side| (2.0 * half[side] / piece_m).ceil().clamp(1.0, 64.0));
         let size = [2.0 * half[across] / pieces[0], 2.0 * half[up] / pieces[1]];
         for way in [1.0, -1.0] {
             for i in 0..pieces[0] as u32 {
@@ -132,7 +140,7 @@ mod tests {
     use std::sync::Arc;
 
     fn area(shape: &Shape) -> f64 {
-        facets(shape).iter().map(|f| f.area_m2).sum()
+        facets(shape, PIECE_M).iter().map(|f| f.area_m2).sum()
     }
 
     /// Surfaces by hand.
@@ -151,6 +159,24 @@ mod tests {
         assert!(cube.is_some_and(|area| is(area, 6.0)), "{cube:?}");
     }
 
+    /// Near ones are cut finer, and the whole stays as large.
+    #[test]
+    fn pieces_are_as_long_as_lobes_light() {
+        let sizes = [100.0, 8.0, 1.0].map(|away_m| piece_m(0.05, away_m));
+        let expected = [1.5, 0.75, 0.375];
+        assert!(
+            sizes
+                .iter()
+                .zip(expected)
+                .all(|(size, e)| (size - e).abs() < 1e-12),
+            "{sizes:?}"
+        );
+        let wall = Shape::Box(Vector3::new(0.1, 1.4, 1.7));
+        let [whole, fine] = [1.5, 0.375].map(|size| facets(&wall, size));
+        let sum = |facets: &[Facet]| facets.iter().map(|f| f.area_m2).sum::<f64>();
+        assert!(fine.len() > 8 * whole.len() && (sum(&fine) / sum(&whole) - 1.0).abs() < 1e-9);
+    }
+
     /// A metal ball echoes pi r^2 from all sides, within the graininess of its pieces.
     #[test]
     fn val_a_ball_echoes_its_shadow() {
@@ -159,7 +185,7 @@ mod tests {
             slope_rad: 0.05,
             diffuse: 0.3,
         };
-        let ball = facets(&Shape::Sphere(0.4));
+        let ball = facets(&Shape::Sphere(0.4), PIECE_M);
         let n = 500;
         let golden = PI * (3.0 - 5f64.sqrt());
         let sections: Vec<f64> = (0..n)
