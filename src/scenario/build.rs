@@ -89,6 +89,7 @@ impl OnboardSettings {
             imu: file.imu,
             odometer: file.odometer,
             doppler: file.doppler,
+            radar: file.radar.clone(),
             gnss: file.gnss,
             led: file.stack.led.clone(),
             occupancy: file.stack.occupancy,
@@ -326,6 +327,12 @@ fn history_s(file: &ScenarioFile) -> f64 {
     let span_s = spans.fold(0.0, |s: f64, rig| s.max(needed_s(rig)));
     let late_s = file.faults.cameras.iter().map(|fault| fault.late_s());
     let latency_s = 1e-3 * file.stack.latency_ms + late_s.fold(0.0, f64::max);
+    // A radar's frame is made when it is over.
+    let others = file.onboard.iter().filter_map(|other| other.radar.as_ref());
+    let radars = file.radar.iter().chain(others);
+    let frame_s = radars.fold(0.0, |s: f64, radar| s.max(radar.frame_s()));
     // A fix is scored when it has gone through the stack.
-    (2.0 * span_s + latency_s + 0.1).max(PhysicsSettings::default().history_s)
+    (2.0 * span_s + latency_s + 0.1)
+        .max(2.0 * frame_s + 0.1)
+        .max(PhysicsSettings::default().history_s)
 }

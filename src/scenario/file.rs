@@ -16,7 +16,7 @@ use crate::twin::physics::{
 };
 use crate::twin::sensors::{
     CameraSettings, DopplerSettings, GnssSettings, ImuSettings, LidarSettings, OdometerSettings,
-    RigSettings,
+    RadarSettings, RigSettings,
 };
 use crate::twin::survey::SurveySettings;
 use schemars::JsonSchema;
@@ -82,6 +82,8 @@ settings! {
         odometer: OdometerSettings, nested;
         /// A Doppler radar on the train. Default: none.
         doppler: Option<DopplerSettings>, nested;
+        /// A 77 GHz radar that looks along the track. Default: none.
+        radar: Option<RadarSettings>, nested;
         /// A satellite receiver on the train. Default: none, so no track occupancy.
         gnss: Option<GnssSettings>, nested;
         /// Sensors and equipment of other trains. Default: none.
@@ -140,6 +142,8 @@ settings! {
         odometer: OdometerSettings, nested;
         /// Its Doppler radar. Default: none.
         doppler: Option<DopplerSettings>, nested;
+        /// Its 77 GHz radar. Default: none.
+        radar: Option<RadarSettings>, nested;
         /// Its satellite receiver. Default: none.
         gnss: Option<GnssSettings>, nested;
         /// Its positioning by lamps.

@@ -17,8 +17,8 @@ use crate::track::plan::PlanNetwork;
 use crate::twin::physics::World;
 use crate::twin::random::{Stream, branch};
 use crate::twin::sensors::{
-    BaliseAntenna, Doppler, Gnss, GnssSeeds, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera,
-    WaysideCamera, WaysideLidar,
+    BaliseAntenna, Doppler, Gnss, GnssSeeds, Imu, Lidar, MountedRadar, Odometer, Periodic, Radar,
+    RadarSettings, Sensor, StereoCamera, WaysideCamera, WaysideLidar,
 };
 use std::sync::Arc;
 
@@ -107,6 +107,7 @@ impl Fitting {
                 };
                 self.add_sensor(node.clone(), Gnss::new(settings, train, tracks, seeds));
             }
+            self.add_radars(scenario, onboard, &node);
         }
         if let Some(rig) = &onboard.rig {
             let camera = StereoCamera::new(train, rig, &scenario.file.faults.cameras, seed);
@@ -143,6 +144,18 @@ impl Fitting {
             };
             let radar = Periodic::new(settings.rate_hz, settings.clock, read);
             self.add_sensor(node.clone(), radar);
+        }
+    }
+
+    fn add_radars(&mut self, scenario: &Scenario, onboard: &OnboardSettings, node: &Node) {
+        let all: Vec<MountedRadar> = scenario
+            .onboard
+            .iter()
+            .flat_map(|o| radars(scenario, o))
+            .collect();
+        let (tracks, air) = (&scenario.tunnel.network.tracks, scenario.file.air.air());
+        for radar in radars(scenario, onboard) {
+            self.add_sensor(node.clone(), Radar::new(radar, &all, tracks, &air));
         }
     }
 
@@ -243,6 +256,22 @@ impl Maps {
     fn route(&self, train: TrainId) -> Route {
         self.routes[train.index()].clone()
     }
+}
+
+/// The radars of a train, each with the errors that follow from the scenario's seed.
+pub fn radars(scenario: &Scenario, onboard: &OnboardSettings) -> Vec<MountedRadar> {
+    let (train, seed) = (onboard.id(), train_seed(scenario.file.seed, onboard.id()));
+    let at = |settings: &RadarSettings| {
+        let ends = settings.ends.iter();
+        let mounted = ends.map(|&end| MountedRadar {
+            train,
+            end,
+            settings: settings.clone(),
+            seed,
+        });
+        mounted.collect()
+    };
+    onboard.radar.as_ref().map_or_else(Vec::new, at)
 }
 
 /// What everything random on a train follows from: the scenario's seed for its first train.

@@ -1,11 +1,13 @@
 //! Units, which the names of keys end with.
 
 /// Endings of keys with their units.
-const UNITS: [(&str, &str); 46] = [
+const UNITS: [(&str, &str); 50] = [
     ("_c", "deg C"),
     ("_c_per_m", "deg C/m"),
     ("_cd", "cd"),
     ("_db", "dB"),
+    ("_dbi", "dBi"),
+    ("_dbm", "dBm"),
     ("_deg", "deg"),
     ("_deg_h", "deg/h"),
     ("_deg_s", "deg/s"),
@@ -26,7 +28,9 @@ const UNITS: [(&str, &str); 46] = [
     ("_lm_per_w", "lm/W"),
     ("_lx", "lx"),
     ("_m", "m"),
+    ("_m2", "m^2"),
     ("_mg", "mg"),
+    ("_mhz", "MHz"),
     ("_mm", "mm"),
     ("_mn_m", "MN/m"),
     ("_mn_m_rad", "MN m/rad"),

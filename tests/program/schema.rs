@@ -93,6 +93,7 @@ const SCENARIO: &str = r#"
     other_trains = [{}]
     rig = { lens = { focus_m = 5.0 }, exposure_control = { max_exposure_us = 30.0 } }
     doppler = {}
+    radar = { road = {} }
     bench = {}
     air = { visibility_m = 100.0 }
     wayside = [{ device = "W", lidar = {} }]

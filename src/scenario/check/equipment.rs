@@ -65,6 +65,7 @@ pub(super) fn check_motion(file: &ScenarioFile, check: &mut Checker<'_>) {
     let Some(train) = &file.train else {
         let carried = [
             ("doppler", file.doppler.is_some()),
+            ("radar", file.radar.is_some()),
             ("gnss", file.gnss.is_some()),
         ];
         for (key, _) in carried.into_iter().filter(|(_, given)| *given) {

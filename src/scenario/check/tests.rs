@@ -18,8 +18,8 @@ fn keys(rest: &str) -> Vec<String> {
 #[test]
 fn sensors_of_motion_need_their_place() {
     assert_eq!(
-        keys("[bench]\n[rig]\n[doppler]\n[gnss]\n"),
-        ["doppler", "gnss"]
+        keys("[bench]\n[rig]\n[doppler]\n[radar]\n[gnss]\n"),
+        ["doppler", "radar", "gnss"]
     );
     assert_eq!(keys("[train]\n[doppler]\n[odometer]\naxle = 24\n"), [""; 0]);
     let short = "[train]\ncars = 2\n[odometer]\naxle = 9\n[doppler]\nrate_hz = 0.0\n";

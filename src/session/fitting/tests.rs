@@ -50,6 +50,38 @@ fn run(
     }
 }
 
+/// A radar at either end gives its frames by number, each when its last chirp is over, 3.2 ms after its start; the clock of
+/// both is 20 ms fast.
+#[test]
+fn radars_at_both_ends_give_their_frames() {
+    let radar = "[radar]\nends = [\"front\", \"rear\"]\nframes_per_s = 20.0\nclock = { offset_ms = 20.0 }\n";
+    let scenario = scenario(&format!("{TRAIN}{radar}"));
+    let sheets = radars(&scenario, &scenario.onboard[0]).len();
+    let mut world = world(&scenario);
+    let mut frames = Vec::new();
+    run(&scenario, &mut world, 0.3, |now, _, output| {
+        if let Output::Sample(sample) = output
+            && let Content::RadarFrame(frame) = sample.content
+        {
+            assert_eq!(sample.valid_at, frame.start);
+            let late_s = now.secs() + 0.020 - frame.start.secs();
+            assert!((0.0032 - 1e-9..0.0043).contains(&late_s), "{late_s}");
+            assert_eq!(frame.counts.len(), 2 * 4 * 128 * 256);
+            frames.push((frame.end, frame.number, frame.start));
+        }
+    });
+    assert_eq!(sheets, 2);
+    for end in [TrainEnd::Front, TrainEnd::Rear] {
+        let of_end: Vec<_> = frames.iter().filter(|(at, ..)| *at == end).collect();
+        let numbers: Vec<u32> = of_end.iter().map(|(_, number, _)| *number).collect();
+        assert_eq!(numbers, [1, 2, 3, 4, 5, 6], "{end:?}");
+        let starts = of_end
+            .iter()
+            .map(|(_, number, start)| start.secs() - 0.05 * f64::from(*number));
+        assert!(starts.into_iter().all(|off| off.abs() < 1e-9));
+    }
+}
+
 /// Each has its own rate, and all agree on the speed of a rolling train within their errors:
 /// wheels to three times 0.3 %, the radar to its mount, its noise and the car's pitch.
 #[test]

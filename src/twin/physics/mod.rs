@@ -28,7 +28,7 @@
 //! |---|---|
 //! | track | `irregularity`, `defect` and `deviation` (where the rails lie), `adhesion` (how slippery they are), `route_track` (all of it, as a wheelset asks) |
 //! | train | `vehicle_file` and `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train`; `carrier` in place of one on a bench |
-//! | obstacles | `obstacle`, `shape`, `obstacle_body`, `cable`, `cable_settings` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact` and `damage`, `entity`, `surroundings` |
+//! | obstacles | `obstacle`, `shape`, `material`, `obstacle_body`, `cable`, `cable_settings` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact` and `damage`, `entity`, `surroundings` |
 //! | world | `settings`, `train_truth` and `truth` (what a session asks), `saved` (a copy goes on exactly), `validation` (against theory and published figures) |
 //!
 //! Vehicles are files; Manchester benchmark vehicle 1 (Iwnicki 1998) and a metro car of class B1
@@ -62,6 +62,7 @@ mod impact;
 mod incident;
 mod interlocking;
 mod irregularity;
+mod material;
 mod obstacle;
 mod obstacle_body;
 mod placement;
@@ -99,6 +100,7 @@ pub use error::PhysicsError;
 pub use history::VehicleMotion;
 pub use impact::Impact;
 pub use irregularity::{IrregularityClass, IrregularitySettings};
+pub use material::ObstacleMaterial;
 pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 

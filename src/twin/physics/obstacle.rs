@@ -1,5 +1,6 @@
 //! Obstacles as a scenario writes them, and the single things that come of one entry.
 
+use super::material::ObstacleMaterial;
 use super::shape::ObstacleShape;
 use crate::settings::{Checker, settings};
 use crate::twin::geometry::Shape;
@@ -29,6 +30,9 @@ settings! {
         rolling_resistance: f64 = 0.02, in 0.0..=1.0;
         /// Share of light reflected, 0 to 1.
         albedo: f64 = 0.3, in 0.0..=1.0;
+        /// What it is made of, for a radar: `metal`, `masonry`, `wood`, `plastic`, `cardboard`, or `vehicle`.
+        /// Default: a rock is masonry, the rest metal.
+        material: Option<ObstacleMaterial> = None;
         /// Temperature of its surface, degrees Celsius.
         temperature_c: f64 = 20.0, in -50.0..=1500.0;
         /// Name of the track. Default: the tunnel's first.
@@ -142,6 +146,15 @@ impl ObstacleSettings {
                 format!("spread them wider with spread_m, or have {most:.0} at most"),
             );
         }
+    }
+
+    /// What it is made of.
+    pub fn made_of(&self) -> ObstacleMaterial {
+        let by_shape = match self.body {
+            ObstacleShape::Rock { .. } => ObstacleMaterial::Masonry,
+            _ => ObstacleMaterial::Metal,
+        };
+        self.material.unwrap_or(by_shape)
     }
 
     /// Attitude to the line.

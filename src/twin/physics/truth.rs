@@ -1,9 +1,10 @@
 //! What sessions ask of the world to score by.
 
 use super::cable::{Cable, bounds};
-use super::obstacle::SingleObstacle;
+use super::obstacle::{ObstacleSettings, SingleObstacle};
 use super::obstacle_body::{ObstacleBody, Rest};
-use super::{Impact, World};
+use super::walker::Walker;
+use super::{Impact, ObstacleMaterial, World};
 use crate::bus::{SimTime, TrainId};
 use crate::track::TrackId;
 use crate::twin::geometry::Body;
@@ -130,6 +131,20 @@ impl World {
         let fallen = around.cables.iter().filter(|cable| cable.loose());
         let loose = loose.filter_map(|obstacle| self.obstacle_truth(obstacle));
         loose.chain(fallen.filter_map(|cable| self.cable_truth(cable)))
+    }
+
+    /// What an obstacle or a load is made of; all else is metal.
+    pub fn material(&self, owner: BodyOwner) -> ObstacleMaterial {
+        let around = &self.surroundings;
+        let settings = match owner {
+            BodyOwner::Obstacle(k) => {
+                let obstacle = around.obstacles.get(k).and_then(Option::as_ref);
+                obstacle.map(|obstacle| &obstacle.piece.settings)
+            }
+            BodyOwner::Load(k) => around.walkers.get(k).and_then(Walker::carries),
+            _ => None,
+        };
+        settings.map_or(ObstacleMaterial::Metal, ObstacleSettings::made_of)
     }
 
     /// Workers who are on the line now.

@@ -6,7 +6,7 @@
 
 use super::entity::Entity;
 use super::groups::{OBSTACLE_GROUP, TRAIN_GROUPS, groups, loose};
-use super::obstacle::SingleObstacle;
+use super::obstacle::{ObstacleSettings, SingleObstacle};
 use super::obstacle_body::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::{Alignment, TrackId};
@@ -70,6 +70,11 @@ impl Walker {
             near_m: settings.path.first().map_or(0.0, |p| p.chainage_m),
             hit: None,
         }
+    }
+
+    /// What he carries, or has put down.
+    pub(super) fn carries(&self) -> Option<&ObstacleSettings> {
+        self.load.as_ref().map(|load| &load.settings)
     }
 
     /// He can pick up what lies there.

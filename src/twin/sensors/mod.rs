@@ -15,7 +15,7 @@
 //! # let _ = speedometer;
 //! ```
 //!
-//! What it does not do: odometer, radar or balise antenna at the rear end; a clock drift
+//! What it does not do: odometer, Doppler radar or balise antenna at the rear end; a clock drift
 //! that varies; time stamps that jump.
 
 mod auto_exposure;
@@ -28,6 +28,7 @@ mod imu;
 mod lamp_view;
 mod lidar;
 mod odometer;
+pub mod radar;
 mod rig;
 mod sensor;
 mod stereo_camera;
@@ -42,6 +43,7 @@ pub use imu::{Imu, ImuSettings};
 pub use lamp_view::{ever_sees, visible_interval};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
+pub use radar::{MountedRadar, Radar, RadarSettings};
 pub use rig::{MountSide, RigError, RigSettings, RightEye};
 pub use sensor::{
     Capture, ClockSettings, FrameHeader, Output, Periodic, Sensor, SensorError, SensorSample,
