@@ -14,6 +14,7 @@ mod odometry;
 pub mod positioning;
 pub mod protection;
 pub mod protection_level;
+pub mod radar;
 mod runs;
 pub mod wayside;
 

@@ -12,12 +12,13 @@
 //! Source: Blanch et al., Baseline advanced RAIM user algorithm, IEEE Trans. Aerospace and Electronic Systems 51 (1), 2015;
 //! WG-C ARAIM Reference Airborne Algorithm Description Document v3.0, equations 7, 8, 31 and 32.
 
+use crate::numerics::bisected;
 use std::f64::consts::SQRT_2;
 
 /// A level over this is none, metres.
 const MOST_M: f64 = 1e12;
-/// The level is found to this share of it.
-const EXACT: f64 = 1e-9;
+/// Of bisections: to a millionth of a millionth of where they begin.
+const STEPS: u32 = 40;
 
 /// A fault that may be there unnoticed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +47,7 @@ pub fn normal_tail(x: f64) -> f64 {
 
 /// The number that a normal one is over with a probability, by bisection; 0 at one half and above.
 pub fn normal_quantile(probability: f64) -> f64 {
-    bisect(|x| normal_tail(x) > probability, 40.0)
+    bisected((0.0, 40.0), STEPS, |x| normal_tail(x) > probability).1
 }
 
 impl FaultMode {
@@ -73,23 +74,9 @@ pub fn protection_level_m(fault_free: &EstimateBound, faults: &[FaultMode], risk
         most_m *= 2.0;
     }
     match most_m < MOST_M {
-        true => bisect(is_over, most_m),
+        true => bisected((0.0, most_m), STEPS, is_over).1,
         false => f64::INFINITY,
     }
-}
-
-/// Where something that is so from 0 on stops being so, before a number.
-fn bisect(is: impl Fn(f64) -> bool, most: f64) -> f64 {
-    let [mut low, mut high] = [0.0, most];
-    while high - low > EXACT * high {
-        let middle = 0.5 * (low + high);
-        if is(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
 }
 
 #[cfg(test)]
