@@ -118,6 +118,9 @@ impl CombinedPositioning {
         }
         self.monitor.heard(source, time);
         if !self.monitor.healthy().has(source) && !self.is_back(measured) {
+            if source == Source::Odometer {
+                self.mark();
+            }
             return;
         }
         self.bank.take(measured, &self.settings);
@@ -142,6 +145,11 @@ impl CombinedPositioning {
     /// The odometer says that it cannot be believed now: a wheel slides or slips.
     pub fn on_slide(&mut self, time: SimTime) {
         self.monitor.heard(Source::Odometer, time);
+        self.mark();
+    }
+
+    /// The next run counts from here.
+    fn mark(&mut self) {
         self.bank.mark();
         self.models.mark();
     }

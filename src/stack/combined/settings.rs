@@ -47,8 +47,6 @@ settings! {
         odometer_fault: f64 = 1e-3, in 0.0..=0.5;
         /// The antenna of the receiver behind the head, metres.
         antenna_behind_head_m: f64 = 10.0, in -10.0..=200.0;
-        /// The tag reader behind the head, metres.
-        reader_behind_head_m: f64 = 2.0, in -10.0..=200.0;
         /// After a change of mode what the position would jump by fades with this time constant, seconds.
         fade_s: f64 = 3.0, in 0.01..=60.0;
     }

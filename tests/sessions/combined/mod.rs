@@ -57,7 +57,7 @@ struct Errors {
 }
 
 /// Every single and double failure and that of all three, for a minute each on plain line and stations, and in the tunnel:
-/// alarms within 2 s, no jump of 3 sigma where the mode changes (but for a tag that is read in the same tenth of a second), lost where all have failed and only there, and errors within the protection level.
+/// alarms within 2 s, no jump of 3 sigma where the mode changes (but for a tag that is read in the same tenth of a second), lost where all have failed and only there, all in order again at the end of the run, and errors within the protection level.
 /// Prints errors by zone and mode.
 #[test]
 fn val_failures_are_alarmed_and_never_jump() {
@@ -75,12 +75,13 @@ fn val_failures_are_alarmed_and_never_jump() {
                 };
                 let sources = Source::ALL.into_iter().filter(|source| failed.has(*source));
                 let faults: Vec<Fault> = sources.map(silent).collect();
-                let mut alarmed = Sources::NONE;
+                let (mut alarmed, mut recovered) = (Sources::NONE, Sources::NONE);
                 // Place, speed, and what counted.
                 let mut before: Option<(f64, f64, Sources)> = None;
                 let mut awaited_s = [0.0; 3];
                 run(100 * k as u64 + number, &faults, |seen| {
                     let estimate = &seen.estimate;
+                    recovered = estimate.healthy;
                     for alarm in seen.alarms {
                         alarmed = alarmed.with(alarm.source, true);
                         assert!(failed.has(alarm.source), "{alarm:?} at {} s", seen.time_s);
@@ -120,6 +121,7 @@ fn val_failures_are_alarmed_and_never_jump() {
                     errors.levels_m.push(estimate.protection_level_m);
                 });
                 assert_eq!(alarmed, failed, "from {from_s} s");
+                assert_eq!(recovered, Sources::ALL, "{failed:?} from {from_s} s");
             }
         }
     }
