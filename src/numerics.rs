@@ -17,3 +17,8 @@ pub(crate) fn bisected(
     }
     (low, high)
 }
+
+/// A value that repeats after a span, to within half a span of 0.
+pub(crate) fn wrapped(value: f64, span: f64) -> f64 {
+    value - span * (value / span).round()
+}

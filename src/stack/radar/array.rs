@@ -132,7 +132,9 @@ fn aperture(places: &[f64]) -> (f64, bool) {
     }
     let even = length / (count - 1.0);
     let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
-    let is_even = gaps.into_iter().all(|gap| (gap / even - 1.0).abs() < UNEVEN);
+    let is_even = gaps
+        .into_iter()
+        .all(|gap| (gap / even - 1.0).abs() < UNEVEN);
     (length + even, is_even)
 }
 

@@ -1,9 +1,10 @@
 //! A spectrum between its bins.
 //!
 //! N samples have a spectrum at all frequencies, and its N bins say all of it: at the frequency f (in bins) it is
-//! sum_k X_k D(f - k), D(x) = exp(-i pi x (N - 1) / N) sin(pi x) / (N sin(pi x / N)). Terms fall with the square of the
-//! distance (or, with a window, faster), so that those of [`REACH`] bins to either side leave 2 / (pi^2 REACH) of the
-//! power out, 0.1 dB at worst.
+//! sum_k X_k D(f - k), D(x) = exp(-i pi x (N - 1) / N) sin(pi x) / (N sin(pi x / N)). Here only [`REACH`] bins to either
+//! side are summed. With a window the others hold nothing. Without one they hold up to 2 / (pi^2 REACH) of a tone's power,
+//! more on one side than on the other: then X is a multiple of D itself, and the place is sought where the bins that are
+//! summed are most like it, which is where sum X D / sqrt(sum D^2) is highest.
 
 use rustfft::num_complex::Complex32;
 use std::f64::consts::PI;
@@ -27,16 +28,19 @@ pub struct Axis {
     pub bins: usize,
     /// Bins to either side that there are.
     reach: usize,
+    /// No window.
+    is_bare: bool,
     /// By step from the farthest below to the farthest above.
     kernels: Vec<Profile>,
 }
 
 impl Axis {
-    /// Of so many bins.
-    pub fn new(bins: usize) -> Self {
+    /// Of so many bins, of samples without a window or with one.
+    pub fn new(bins: usize, is_bare: bool) -> Self {
         let mut axis = Self {
             bins,
             reach: REACH.min(bins.saturating_sub(1) / 2),
+            is_bare,
             kernels: Vec::new(),
         };
         let steps = -FARTHEST..=FARTHEST;
@@ -49,8 +53,28 @@ impl Axis {
         (middle + k + self.bins * REACH - REACH) % self.bins
     }
 
-    /// Weights of the bins at an offset from the middle one.
+    /// Weights of the bins at an offset from the middle one, to find a tone.
     pub fn kernel(&self, offset: f64) -> Profile {
+        self.scaled(offset, -0.5)
+    }
+
+    /// Weights that give its amplitude there.
+    pub fn amplitude(&self, offset: f64) -> Profile {
+        self.scaled(offset, -1.0)
+    }
+
+    /// Without a window, times a power of the sum of squares.
+    fn scaled(&self, offset: f64, exponent: f32) -> Profile {
+        let mut kernel = self.bare(offset);
+        if self.is_bare {
+            let sum: f32 = kernel.iter().map(|weight| weight.norm_sqr()).sum();
+            let scale = sum.powf(exponent);
+            kernel.iter_mut().for_each(|weight| *weight *= scale);
+        }
+        kernel
+    }
+
+    fn bare(&self, offset: f64) -> Profile {
         let count = self.bins as f64;
         let mut kernel = [Complex32::default(); BINS];
         for (k, out) in kernel.iter_mut().enumerate() {
@@ -59,7 +83,11 @@ impl Axis {
             }
             let x = offset - (k as f64 - REACH as f64);
             let below = count * (PI * x / count).sin();
-            let size = if below.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / below };
+            let size = if below.abs() < 1e-9 {
+                1.0
+            } else {
+                (PI * x).sin() / below
+            };
             let (sin, cos) = (-PI * x * (count - 1.0) / count).sin_cos();
             *out = Complex32::new((size * cos) as f32, (size * sin) as f32);
         }
@@ -79,14 +107,14 @@ impl Axis {
         vertex(power, vertex(power, start, 0.5 / STEPS), 0.1 / STEPS)
     }
 
-    /// Other places, by offset, where the profile is higher than on either side, up to 2 bins away.
-    pub fn other_heights(&self, profile: &Profile, about: f64) -> impl Iterator<Item = f64> {
-        let powers = (-FARTHEST..=FARTHEST).map(|k| self.coarse(profile, k));
-        let powers: Vec<f32> = powers.collect();
-        let is_top = move |k: &usize| powers[k - 1] < powers[*k] && powers[*k] >= powers[k + 1];
-        let tops = (1..2 * FARTHEST as usize).filter(is_top);
-        let offsets = tops.map(|k| (k as f64 - FARTHEST as f64) / STEPS);
-        offsets.filter(move |offset| (offset - about).abs() > 2.0 / STEPS)
+    /// The highest of other places, by offset, where the profile is higher than on either side, up to 2 bins away.
+    pub fn other_height(&self, profile: &Profile, about: f64) -> Option<f64> {
+        let power = |k: isize| self.coarse(profile, k);
+        let is_top = |k: &isize| power(k - 1) < power(*k) && power(*k) >= power(k + 1);
+        let is_other = |k: &isize| (*k as f64 / STEPS - about).abs() > 2.0 / STEPS;
+        let tops = (1 - FARTHEST..FARTHEST).filter(|k| is_other(k) && is_top(k));
+        let highest = tops.max_by(|a, b| power(*a).total_cmp(&power(*b)));
+        highest.map(|k| k as f64 / STEPS)
     }
 
     fn coarse(&self, profile: &Profile, step: isize) -> f32 {
@@ -117,7 +145,7 @@ mod tests {
 
     /// The spectrum of a tone about a bin, by its sum.
     fn tone(bins: usize, frequency: f64, middle: usize) -> Profile {
-        let axis = Axis::new(bins);
+        let axis = Axis::new(bins, true);
         let mut profile = [Complex32::default(); BINS];
         for (k, out) in profile.iter_mut().enumerate() {
             let off = frequency - axis.bin(middle, k) as f64;
@@ -137,11 +165,11 @@ mod tests {
             for k in -5..=5 {
                 let offset = f64::from(k) / 10.0;
                 let profile = tone(bins, middle as f64 + offset, middle);
-                let axis = Axis::new(bins);
+                let axis = Axis::new(bins, true);
                 let found = axis.highest(&profile, 0.0, 0.75);
                 assert!((found - offset).abs() < 2e-3, "{bins} {offset} {found}");
-                let power = dot(&profile, &axis.kernel(found)).norm_sqr();
-                assert!((0.95..1.001).contains(&power), "{power}");
+                let power = dot(&profile, &axis.amplitude(found)).norm_sqr();
+                assert!((power - 1.0).abs() < 1e-3, "{power}");
             }
         }
     }
@@ -151,7 +179,11 @@ mod tests {
     fn short_axes_do_not_panic() {
         for bins in 1..20 {
             let profile = tone(bins, 0.3, 0);
-            assert!(Axis::new(bins).highest(&profile, 0.0, 0.75).is_finite());
+            assert!(
+                Axis::new(bins, true)
+                    .highest(&profile, 0.0, 0.75)
+                    .is_finite()
+            );
         }
     }
 }

@@ -1,40 +1,40 @@
-//! The onboard radar: from the sampled beat signal of a 77 GHz FMCW radar to echoes that stand out of the noise.
+//! The onboard radar: from the sampled beat signal of an FMCW radar to targets that are followed.
 //!
-//! [`RangeDoppler`] turns a frame into power by range, radial speed and azimuth; [`Cfar`] says which of its cells are no noise.
+//! A frame goes through transforms to the power by range, radial speed and beam (`range_doppler`, `array`, [`window`]),
+//! through detection ([`cfar`]), to echoes between cells (`peak`, `interpolation`, `angle`), in metres, m/s, radians and
+//! square metres (`detector`); detections of one body become one (`clustering`), bodies are followed (`tracker`, `target`,
+//! `assignment`) while the train moves (`own_motion`), and mirror images in walls are marked (`ghosts`).
 //!
-//! ```
-//! use metrotwin::bus::{RadarFrame, RadarSheet, RadarWaveform, SimTime, TrainEnd};
-//! use metrotwin::stack::radar::{Cfar, RadarSettings, RangeDoppler};
+//! Frames of reference: that of the radar for detections (see [`crate::bus::RadarSheet`]), the vehicle frame of its end of
+//! the train for targets, whose velocities are over ground. Heights are not told: all is taken to be at the radar's.
 //!
-//! let waveform = RadarWaveform {
-//!     start_hz: 76.5e9, slope_hzps: 16.26e12, sample_rate_hz: 25e6,
-//!     samples: 64, loops: 32, chirp_interval_s: 12.5e-6,
-//! };
-//! let sheet = RadarSheet {
-//!     end: TrainEnd::Front, waveform,
-//!     transmitters_m: vec![[0.0, 0.0]], receivers_m: vec![[0.0, 0.0], [0.00196, 0.0]],
-//!     power_dbm: 12.0, transmit_gain_dbi: 12.0, receive_gain_dbi: 12.0,
-//!     noise_figure_db: 13.0, full_scale_dbm: -45.0, vehicle_from_radar: nalgebra::Isometry3::identity(),
-//! };
-//! let settings = RadarSettings::default();
-//! let mut transform = RangeDoppler::new(&sheet, &settings);
-//! let counts = vec![[0, 0]; sheet.frame_samples()];
-//! let silence = RadarFrame { end: TrainEnd::Front, number: 0, start: SimTime::ZERO, counts };
-//! let cells = transform.transform(&silence).unwrap();
-//! let mut cfar = Cfar::new(&settings, cells.layout.columns());
-//! cfar.detect(cells.powers, |range, column| panic!("nothing echoes: {range}, {column}"));
-//! ```
+//! Buffers and transforms are made once: up to the detections nothing is allocated in a frame.
 //!
-//! What it does not do yet: places of echoes finer than a cell, targets followed over frames, ghosts told from targets.
+//! What it cannot do: echoes that come nearer by more than a cell of range within a frame are smeared; a scatterer's delay
+//! is taken to be the same for all of a chirp, as the bus says; two targets that cross within a cell may change their
+//! names.
 
-mod cfar;
+mod angle;
+mod array;
+mod assignment;
+pub mod cfar;
+mod clustering;
+mod detector;
+mod ghosts;
+mod interpolation;
+mod own_motion;
+mod peak;
 mod range_doppler;
 mod settings;
+mod target;
 #[cfg(test)]
-pub(crate) mod testing;
-mod window;
+mod testing;
+mod tracker;
+mod tracking;
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tracking_tests;
+pub mod window;
 
-pub use cfar::{Cfar, cell_averaging_factor, ordered_statistic_factor};
-pub use range_doppler::{Cells, Layout, RangeDoppler};
 pub use settings::{CfarKind, RadarSettings};
-pub use window::{Weights, Window};
+pub use tracking::RadarTracking;

@@ -1,411 +1,281 @@
-//! From the samples of a frame to power by range, radial speed and azimuth.
+//! From samples to the power by range, radial speed and beam.
 //!
-//! Fourier transforms over the samples of a chirp give the range, over the loops of a frame the radial speed, and sums over
-//! the pairs of transmitters and receivers the azimuth: a pair stands for an element at the sum of both places, and beams
-//! are steered to evenly spaced sines of the azimuth, as many as there are elements. With elements half a wave apart in a
-//! line these beams are orthogonal, so that cells of white noise have nothing to do with each other.
+//! The samples of a chirp are a tone whose frequency is the range: a Fourier transform over them, and one over the loops
+//! for the radial speed, by transmitter and receiver. Transmitter k of K sends k / K of a loop later than the first; at
+//! the speed of bin d of M an echo turns by 2 pi d k / (M K) in that time, which is taken back before beams are formed.
+//! Weights of samples, loops and elements have the sum of squares one, so that a cell of noise keeps the power of a
+//! sample of noise, and is exponentially distributed. Without windows cells are independent.
 //!
-//! Transmitters send one after the other: in the cell of a speed, what comes of the k-th is turned back by what the echo has
-//! turned in k chirps. An echo faster than [`RadarWaveform::most_speed_mps`](crate::bus::RadarWaveform::most_speed_mps) is in
-//! the cell of another speed, and is turned back by too little: its azimuth is wrong too.
-//!
-//! Windows and sums leave the power of noise as it is: a cell has the mean power of a sample of noise, counts^2, and an
-//! exponential distribution.
-//!
-//! Source: M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, chapters 4 and 9; Texas Instruments
-//! SWRA554A, MIMO Radar, 2018, for the phase of transmitters that take turns.
+//! Source: S. Rao, Introduction to mmWave Sensing: FMCW Radars (2017), for the order of transforms; J. Bechter, F. Roos
+//! and C. Waldschmidt, IEEE Microw. Wireless Compon. Lett. 27 (2017), for the turn between transmitters.
 
+use super::array::VirtualArray;
 use super::settings::RadarSettings;
 use super::window::Weights;
-use crate::bus::{RadarFrame, RadarSheet};
-use rustfft::num_complex::Complex;
+use crate::bus::RadarSheet;
+use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 use std::sync::Arc;
 
-/// The transforms of a radar's frames, with all that they need: a frame allocates nothing.
+/// So many cells tell the noise to half a percent.
+const NOISE_CELLS: usize = 32_768;
+
+/// Samples of a chirp, loops, transmitters and receivers.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    /// Samples of a chirp, which are bins of range.
+    pub samples: usize,
+    /// Loops, which are bins of speed.
+    pub loops: usize,
+    /// Transmitters.
+    pub transmitters: usize,
+    /// Receivers.
+    pub receivers: usize,
+}
+
+impl Shape {
+    /// Of a sheet.
+    pub fn new(sheet: &RadarSheet) -> Self {
+        Self {
+            samples: sheet.waveform.samples as usize,
+            loops: sheet.waveform.loops as usize,
+            transmitters: sheet.transmitters_m.len(),
+            receivers: sheet.receivers_m.len(),
+        }
+    }
+
+    /// Pairs of transmitter and receiver.
+    pub fn channels(&self) -> usize {
+        self.transmitters * self.receivers
+    }
+
+    /// Cells of one channel or beam.
+    pub fn cells(&self) -> usize {
+        self.samples * self.loops
+    }
+
+    /// Bin of a speed as a number below 0 for what comes nearer.
+    pub fn signed(&self, speed_bin: usize) -> f64 {
+        let bin = speed_bin as f64;
+        if 2 * speed_bin < self.loops {
+            bin
+        } else {
+            bin - self.loops as f64
+        }
+    }
+}
+
+/// Transforms, planned once, and their buffers.
 pub struct RangeDoppler {
-    layout: Layout,
-    range_window: Vec<f32>,
-    speed_window: Vec<f32>,
+    /// What it was planned for.
+    pub shape: Shape,
+    /// Elements and beams.
+    pub array: VirtualArray,
+    range_weights: Vec<f32>,
+    speed_weights: Vec<f32>,
     range_fft: Arc<dyn Fft<f32>>,
     speed_fft: Arc<dyn Fft<f32>>,
-    /// By transmitter and speed: what turns its echoes back.
-    turned_back: Vec<Complex<f32>>,
-    /// By beam and channel.
-    steering: Vec<Complex<f32>>,
-    chirp: Vec<Complex<f32>>,
-    scratch: Vec<Complex<f32>>,
+    scratch: Vec<Complex32>,
+    /// Of one channel, by loop, then range; then by range, then loop.
+    chirps: Vec<Complex32>,
+    lines: Vec<Complex32>,
     /// By channel, range, speed.
-    spectrum: Vec<Complex<f32>>,
-    /// Of one range and beam, by speed.
-    beam: Vec<Complex<f32>>,
+    spectrum: Vec<Complex32>,
+    /// By transmitter, then speed: what it turned later.
+    turns: Vec<Complex32>,
+    /// A line of range of all channels, turned back; and of a beam.
+    turned: Planes,
+    beam: Planes,
+    /// By beam, range, speed.
     powers: Vec<f32>,
+    noise_cells: Vec<f32>,
 }
 
-/// How many there are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layout {
-    /// Samples of a chirp, which are cells of range.
-    pub ranges: usize,
-    /// Loops of a frame, which are cells of speed.
-    pub speeds: usize,
-    /// Pairs of transmitters and receivers, which are beams.
-    pub beams: usize,
-    transmitters: usize,
+/// Real and imaginary parts apart, which processors add faster.
+#[derive(Clone, Debug)]
+struct Planes {
+    re: Vec<f32>,
+    im: Vec<f32>,
 }
 
-/// Powers of a frame, counts^2: by range, then beam, then speed.
-#[derive(Clone, Copy, Debug)]
-pub struct Cells<'a> {
-    /// All of them.
-    pub powers: &'a [f32],
-    /// How they lie.
-    pub layout: Layout,
-}
-
-impl Layout {
-    fn of(sheet: &RadarSheet) -> Self {
+impl Planes {
+    fn new(count: usize) -> Self {
         Self {
-            ranges: sheet.waveform.samples as usize,
-            speeds: sheet.waveform.loops as usize,
-            beams: sheet.channels(),
-            transmitters: sheet.transmitters_m.len(),
+            re: vec![0.0; count],
+            im: vec![0.0; count],
         }
-    }
-
-    /// Cells of one range.
-    pub fn columns(&self) -> usize {
-        self.beams * self.speeds
-    }
-
-    /// Number of a speed cell counted from standing: below 0 nearer.
-    pub fn signed_speed(&self, speed: usize) -> f64 {
-        match 2 * speed < self.speeds {
-            true => speed as f64,
-            false => speed as f64 - self.speeds as f64,
-        }
-    }
-
-    /// Sine of the azimuth that a beam looks to.
-    pub fn sine(&self, beam: usize) -> f64 {
-        2.0 * (beam as f64 - (self.beams / 2) as f64) / self.beams as f64
-    }
-}
-
-impl Cells<'_> {
-    /// Power of one.
-    pub fn power(&self, range: usize, beam: usize, speed: usize) -> f32 {
-        self.powers[range * self.layout.columns() + beam * self.layout.speeds + speed]
-    }
-
-    /// Range, beam and speed of the strongest.
-    pub fn strongest(&self) -> [usize; 3] {
-        let numbered = self.powers.iter().enumerate();
-        let most = numbered.max_by(|a, b| a.1.total_cmp(b.1));
-        let (columns, speeds) = (self.layout.columns(), self.layout.speeds);
-        most.map_or([0; 3], |(k, _)| {
-            let column = k % columns;
-            [k / columns, column / speeds, column % speeds]
-        })
     }
 }
 
 impl RangeDoppler {
-    /// For the frames of a radar.
-    pub fn new(sheet: &RadarSheet, settings: &RadarSettings) -> Self {
-        let layout = Layout::of(sheet);
-        let window = |kind, count| {
-            let weights = Weights::new(kind, count, settings.chebyshev_db);
-            weights.values.iter().map(|w| *w as f32).collect()
-        };
+    /// For the frames of a sheet.
+    pub fn new(sheet: &RadarSheet, range: &Weights, speed: &Weights) -> Self {
+        let shape = Shape::new(sheet);
+        let array = VirtualArray::new(sheet);
         let mut planner = FftPlanner::new();
-        let range_fft = planner.plan_fft_forward(layout.ranges);
-        let speed_fft = planner.plan_fft_forward(layout.speeds);
-        let scratch = range_fft
-            .get_inplace_scratch_len()
-            .max(speed_fft.get_inplace_scratch_len());
-        let zero = Complex::default();
+        let range_fft = planner.plan_fft_forward(shape.samples);
+        let speed_fft = planner.plan_fft_forward(shape.loops);
+        let scratch =
+            (range_fft.get_inplace_scratch_len()).max(speed_fft.get_inplace_scratch_len());
+        let zeros = |count| vec![Complex32::default(); count];
+        let narrow = |weights: &Weights| weights.values.iter().map(|w| *w as f32).collect();
         Self {
-            range_window: window(settings.range_window, layout.ranges),
-            speed_window: window(settings.speed_window, layout.speeds),
-            turned_back: turned_back(&layout),
-            steering: steering(sheet, &layout),
+            range_weights: narrow(range),
+            speed_weights: narrow(speed),
             range_fft,
             speed_fft,
-            chirp: vec![zero; layout.ranges],
-            scratch: vec![zero; scratch],
-            spectrum: vec![zero; layout.beams * layout.ranges * layout.speeds],
-            beam: vec![zero; layout.speeds],
-            powers: vec![0.0; layout.ranges * layout.columns()],
-            layout,
+            scratch: zeros(scratch),
+            chirps: zeros(shape.cells()),
+            lines: zeros(shape.cells()),
+            spectrum: zeros(shape.channels() * shape.cells()),
+            turns: turns(&shape),
+            turned: Planes::new(shape.channels() * shape.loops),
+            beam: Planes::new(shape.loops),
+            powers: vec![0.0; array.beams * shape.cells()],
+            noise_cells: Vec::with_capacity(2 * NOISE_CELLS),
+            shape,
+            array,
         }
     }
 
-    /// Of a frame; none if it has not the samples that the sheet says.
-    pub fn transform(&mut self, frame: &RadarFrame) -> Option<Cells<'_>> {
-        let Layout {
-            ranges,
-            speeds,
-            beams,
-            ..
-        } = self.layout;
-        if ranges == 0 || frame.counts.len() != ranges * speeds * beams {
-            return None;
+    /// Works a frame's counts up; they must be as many as the sheet says.
+    pub fn process(&mut self, counts: &[[i16; 2]]) {
+        if self.shape.cells() == 0 {
+            return;
         }
-        self.transform_chirps(frame);
-        self.transform_loops();
-        self.form_beams();
-        Some(Cells {
-            powers: &self.powers,
-            layout: self.layout,
-        })
-    }
-
-    /// Chirps lie in the frame by loop, then channel.
-    fn transform_chirps(&mut self, frame: &RadarFrame) {
-        let Layout {
-            ranges,
-            speeds,
-            beams,
-            ..
-        } = self.layout;
-        for (k, counts) in frame.counts.chunks_exact(ranges).enumerate() {
-            let (turn, channel) = (k / beams, k % beams);
-            for ((cell, count), weight) in self.chirp.iter_mut().zip(counts).zip(&self.range_window)
-            {
-                *cell = Complex::new(f32::from(count[0]), f32::from(count[1])) * weight;
-            }
-            self.range_fft
-                .process_with_scratch(&mut self.chirp, &mut self.scratch);
-            let of_channel = &mut self.spectrum[channel * ranges * speeds..][..ranges * speeds];
-            let weight = self.speed_window[turn];
-            for (row, cell) in of_channel.chunks_exact_mut(speeds).zip(&self.chirp) {
-                row[turn] = cell * weight;
+        for channel in 0..self.shape.channels() {
+            self.transform_ranges(counts, channel);
+            self.transform_speeds(channel);
+        }
+        for range in 0..self.shape.samples {
+            self.turn_back(range);
+            for beam in 0..self.array.beams {
+                self.form(beam, range);
             }
         }
     }
 
-    fn transform_loops(&mut self) {
-        let Layout { ranges, speeds, .. } = self.layout;
+    /// Over the samples of each chirp of a channel.
+    fn transform_ranges(&mut self, counts: &[[i16; 2]], channel: usize) {
+        let samples = self.shape.samples;
+        let chirps = counts.chunks_exact(samples).skip(channel);
+        let chirps = chirps.step_by(self.shape.channels());
+        for (out, chirp) in self.chirps.chunks_exact_mut(samples).zip(chirps) {
+            for ((out, count), weight) in out.iter_mut().zip(chirp).zip(&self.range_weights) {
+                let [re, im] = count.map(f32::from);
+                *out = Complex32::new(weight * re, weight * im);
+            }
+        }
+        self.range_fft
+            .process_with_scratch(&mut self.chirps, &mut self.scratch);
+    }
+
+    /// Over the loops of each range of a channel.
+    fn transform_speeds(&mut self, channel: usize) {
+        let Shape { samples, loops, .. } = self.shape;
+        const TILE: usize = 16;
+        for first in (0..samples).step_by(TILE) {
+            let last = (first + TILE).min(samples);
+            for (chirp, weight) in self.speed_weights.iter().enumerate() {
+                let row = &self.chirps[chirp * samples + first..chirp * samples + last];
+                for (range, value) in row.iter().enumerate() {
+                    self.lines[(first + range) * loops + chirp] = value * weight;
+                }
+            }
+        }
         self.speed_fft
-            .process_with_scratch(&mut self.spectrum, &mut self.scratch);
-        let receivers = self.layout.beams / self.layout.transmitters.max(1);
-        let channels = self.spectrum.chunks_exact_mut(ranges * speeds).enumerate();
-        for (channel, of_channel) in channels {
-            let turned = &self.turned_back[channel / receivers * speeds..][..speeds];
-            for row in of_channel.chunks_exact_mut(speeds) {
-                row.iter_mut()
-                    .zip(turned)
-                    .for_each(|(cell, by)| *cell *= by);
+            .process_with_scratch(&mut self.lines, &mut self.scratch);
+        let from = channel * samples * loops;
+        self.spectrum[from..from + samples * loops].copy_from_slice(&self.lines);
+    }
+
+    /// Takes back by what later transmitters' echoes turned.
+    fn turn_back(&mut self, range: usize) {
+        let loops = self.shape.loops;
+        for channel in 0..self.shape.channels() {
+            let from = channel * self.shape.cells() + range * loops;
+            let values = &self.spectrum[from..from + loops];
+            let transmitter = channel / self.shape.receivers;
+            let turns = &self.turns[transmitter * loops..(transmitter + 1) * loops];
+            let to = channel * loops..(channel + 1) * loops;
+            let out = self.turned.re[to.clone()].iter_mut();
+            let out = out.zip(&mut self.turned.im[to]);
+            for ((value, turn), (re, im)) in values.iter().zip(turns).zip(out) {
+                *re = value.re * turn.re - value.im * turn.im;
+                *im = value.re * turn.im + value.im * turn.re;
             }
         }
     }
 
-    fn form_beams(&mut self) {
-        let Layout {
-            ranges,
-            speeds,
-            beams,
-            ..
-        } = self.layout;
-        let of_all = self.powers.chunks_exact_mut(speeds).enumerate();
-        for (k, powers) in of_all {
-            let (range, beam) = (k / beams, k % beams);
-            self.beam.fill(Complex::default());
-            for (channel, steer) in self.steering[beam * beams..][..beams].iter().enumerate() {
-                let row = &self.spectrum[(channel * ranges + range) * speeds..][..speeds];
-                self.beam
-                    .iter_mut()
-                    .zip(row)
-                    .for_each(|(sum, cell)| *sum += cell * steer);
-            }
-            powers
-                .iter_mut()
-                .zip(&self.beam)
-                .for_each(|(power, cell)| *power = cell.norm_sqr());
-        }
-    }
-}
-
-/// An echo in a speed cell turns by the cell's number over the number of loops from loop to loop, and by a share of that from
-/// chirp to chirp.
-fn turned_back(layout: &Layout) -> Vec<Complex<f32>> {
-    let by = |transmitter: usize, speed: usize| {
-        let a_loop = layout.signed_speed(speed) / layout.speeds as f64;
-        let turns = a_loop * transmitter as f64 / layout.transmitters as f64;
-        Complex::from_polar(1.0, (-TAU * turns) as f32)
-    };
-    let all = (0..layout.transmitters).flat_map(|t| (0..layout.speeds).map(move |s| by(t, s)));
-    all.collect()
-}
-
-/// The way of an echo from the left is shorter to an element on the left. Beams leave the power of noise as it is.
-fn steering(sheet: &RadarSheet, layout: &Layout) -> Vec<Complex<f32>> {
-    let elements = sheet.transmitters_m.iter().flat_map(|transmitter| {
-        let receivers = sheet.receivers_m.iter();
-        receivers.map(move |receiver| transmitter[0] + receiver[0])
-    });
-    let elements: Vec<f64> = elements.collect();
-    let share = 1.0 / (layout.beams as f64).sqrt();
-    let steer = |beam: usize, left_m: f64| {
-        let turns = left_m * layout.sine(beam) / sheet.waveform.wave_m();
-        Complex::from_polar(share as f32, (TAU * turns) as f32)
-    };
-    let all = (0..layout.beams).flat_map(|b| elements.iter().map(move |m| steer(b, *m)));
-    all.collect()
-}
-
-#[cfg(test)]
-#[allow(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "a test may panic, and says what it measured"
-)]
-mod tests {
-    use super::super::testing::{Draw, Scatterer, frame, noise_power, sheet, unweighted};
-    use super::*;
-
-    /// Of 10 m^2 at 50 m, and at other ranges so large that it echoes alike: some 32 dB over noise, which few frames tell.
-    fn cross_section_m2(range_m: f64) -> f64 {
-        10.0 * (range_m / 50.0).powi(4)
-    }
-
-    /// Signal over noise in the cell of a target, dB, mean over some frames.
-    fn snr_db(range_m: f64, settings: &RadarSettings, draw: &mut Draw) -> f64 {
-        let sheet = sheet();
-        let mut transform = RangeDoppler::new(&sheet, settings);
-        // In the middles of cells of range, speed and beam: the way is that at the middle of the frame.
-        let bin_m = sheet.waveform.range_bin_m();
-        let range_m = (range_m / bin_m).round() * bin_m;
-        let speed_mps = 8.0 * sheet.waveform.speed_bin_mps(2);
-        let target = Scatterer::polar(range_m, 0.0, speed_mps, cross_section_m2(range_m));
-        let frames = 8;
-        let powers = (0..frames).map(|_| {
-            let frame = frame(&sheet, &[target], 1.0, draw);
-            let cells = transform.transform(&frame).unwrap();
-            let range = (range_m / bin_m).round() as usize;
-            f64::from(cells.power(range, cells.layout.beams / 2, 8))
-        });
-        let mean = powers.sum::<f64>() / f64::from(frames);
-        10.0 * (mean / noise_power(&sheet) - 1.0).log10()
-    }
-
-    /// Radar equation: 12 dBm sent, 9 dBi twice, wave of 3.9146 mm, spread of
-    /// (4 pi)^3 r^4, against k T B F of 25 MHz and 13 dB, with 256 x 128 x 8 samples summed.
-    fn by_equation_db(range_m: f64) -> f64 {
-        let received_dbm =
-            12.0 + 18.0 + 10.0 * (3.9146e-3f64.powi(2) * cross_section_m2(range_m)).log10()
-                - 30.0 * (2.0 * TAU).log10()
-                - 40.0 * range_m.log10();
-        let noise_dbm = -173.975 + 10.0 * 25e6f64.log10() + 13.0;
-        received_dbm - noise_dbm + 10.0 * (256.0f64 * 128.0 * 8.0).log10()
-    }
-
-    /// Within half a decibel from 10 to 200 m without windows; with them by their losses less.
-    #[test]
-    fn val_signal_over_noise_is_that_of_the_radar_equation() {
-        let mut draw = Draw::new(4);
-        let windows = RadarSettings::default();
-        let loss_db: f64 = [(windows.range_window, 256), (windows.speed_window, 128)]
-            .map(|(window, count)| Weights::new(window, count, windows.chebyshev_db).loss_db)
-            .iter()
-            .sum();
-        for range_m in [10.0, 50.0, 100.0, 200.0] {
-            let bin_m = sheet().waveform.range_bin_m();
-            let expected_db = by_equation_db((range_m / bin_m).round() * bin_m);
-            let bare_db = snr_db(range_m, &unweighted(), &mut draw);
-            let weighted_db = snr_db(range_m, &windows, &mut draw);
-            println!("{range_m} m: {expected_db:.2} dB, {bare_db:.2}; windows {weighted_db:.2}");
-            assert!(
-                (bare_db - expected_db).abs() < 0.5,
-                "{range_m} m: {bare_db}"
-            );
-            assert!(
-                (weighted_db + loss_db - expected_db).abs() < 0.5,
-                "{range_m} m"
-            );
-        }
-    }
-
-    /// Range, radial speed and azimuth each in their cell, with the signs of the bus: away positive, left positive.
-    #[test]
-    fn an_echo_is_where_it_is() {
-        let sheet = sheet();
-        let mut transform = RangeDoppler::new(&sheet, &RadarSettings::default());
-        let mut draw = Draw::new(5);
-        let [range_bin_m, speed_bin_mps] = [
-            sheet.waveform.range_bin_m(),
-            sheet.waveform.speed_bin_mps(2),
-        ];
-        for (range, speed, beam) in [
-            (40, -20.0, 4),
-            (100, 33.0, 6),
-            (12, 0.0, 2),
-            (180, -50.0, 3),
-        ] {
-            let azimuth_rad = transform.layout.sine(beam).asin();
-            let [range_m, speed_mps] = [f64::from(range) * range_bin_m, speed * speed_bin_mps];
-            let target = Scatterer::polar(range_m, azimuth_rad, speed_mps, 100.0);
-            let frame = frame(&sheet, &[target], 1.0, &mut draw);
-            let cells = transform.transform(&frame).unwrap();
-            let found = cells.strongest();
-            let found_speed = cells.layout.signed_speed(found[2]);
-            assert!(
-                found[0].abs_diff(range as usize) <= 1 && found[1] == beam,
-                "{found:?}"
-            );
-            assert!((found_speed - speed).abs() < 0.5, "{found:?}");
-        }
-    }
-
-    /// Two like echoes side by side are two maxima 1.5 cells apart and one at half a cell, whatever their phases.
-    #[test]
-    fn val_echoes_a_cell_and_a_half_apart_are_two() {
-        let sheet = sheet();
-        let mut transform = RangeDoppler::new(&sheet, &unweighted());
-        let mut draw = Draw::new(6);
-        let bin_m = sheet.waveform.range_bin_m();
-        for (apart, expected) in [(2.0, 2), (0.5, 1)] {
-            for phase in 0..4 {
-                let at = |m: f64, phase_rad: f64| Scatterer {
-                    phase_rad,
-                    ..Scatterer::polar(m, 0.0, 0.0, 100.0)
-                };
-                // Of both ways the phases are as asked for.
-                let ways = TAU * 2.0 * apart * bin_m / sheet.waveform.wave_m();
-                let first = at(60.0 * bin_m, 0.0);
-                let second = at((60.0 + apart) * bin_m, f64::from(phase) * 1.5 - ways);
-                let frame = frame(&sheet, &[first, second], 1.0, &mut draw);
-                let cells = transform.transform(&frame).unwrap();
-                let power = |range| cells.power(range, cells.layout.beams / 2, 0);
-                let most = (50..75).map(power).fold(0.0, f32::max);
-                let is_peak = |range: &usize| {
-                    power(*range) > 0.2 * most
-                        && power(*range) > power(range - 1)
-                        && power(*range) >= power(range + 1)
-                };
-                let peaks = (50..75).filter(is_peak).count();
-                assert!(peaks == expected, "{apart} cells, phase {phase}: {peaks}");
+    fn form(&mut self, beam: usize, range: usize) {
+        let loops = self.shape.loops;
+        self.beam.re.fill(0.0);
+        self.beam.im.fill(0.0);
+        for (channel, weight) in self.array.weights(beam).iter().enumerate() {
+            let from = channel * loops..(channel + 1) * loops;
+            let values = self.turned.re[from.clone()]
+                .iter()
+                .zip(&self.turned.im[from]);
+            let sums = self.beam.re.iter_mut().zip(&mut self.beam.im);
+            for ((re, im), (sum_re, sum_im)) in values.zip(sums) {
+                *sum_re += re * weight.re - im * weight.im;
+                *sum_im += re * weight.im + im * weight.re;
             }
         }
+        let from = (beam * self.shape.samples + range) * loops;
+        let values = self.beam.re.iter().zip(&self.beam.im);
+        for (power, (re, im)) in self.powers[from..from + loops].iter_mut().zip(values) {
+            *power = re * re + im * im;
+        }
     }
 
-    /// Provokes: a frame of another radar.
-    #[test]
-    fn a_frame_of_the_wrong_size_is_refused() {
-        let sheet = sheet();
-        let mut transform = RangeDoppler::new(&sheet, &RadarSettings::default());
-        let mut whole = frame(&sheet, &[], 1.0, &mut Draw::new(7));
-        let cells = transform.transform(&whole).unwrap();
-        let mean = cells.powers.iter().sum::<f32>() / cells.powers.len() as f32;
-        let noise = noise_power(&sheet) as f32;
-        // A rounded count has a twelfth of a count's square more, each quadrature.
-        assert!(
-            (mean / (noise + 1.0 / 6.0) - 1.0).abs() < 0.01,
-            "{mean} {noise}"
-        );
-        whole.counts.pop();
-        assert!(transform.transform(&whole).is_none());
+    /// Powers of a beam, by range, then speed, counts^2.
+    pub fn beam_powers(&self, beam: usize) -> &[f32] {
+        let cells = self.shape.cells();
+        &self.powers[beam * cells..(beam + 1) * cells]
     }
+
+    /// A channel's value in a cell, not turned back.
+    pub fn value(&self, channel: usize, range: usize, speed: usize) -> Complex32 {
+        self.spectrum[channel * self.shape.cells() + range * self.shape.loops + speed]
+    }
+
+    /// Power of a cell of noise, counts^2: half of exponentially distributed cells are above ln 2 of their mean, and
+    /// echoes in a small part of them change that little.
+    pub fn noise(&mut self) -> f64 {
+        // Odd, so that all speeds come in.
+        let every = (self.powers.len() / NOISE_CELLS) | 1;
+        self.noise_cells.clear();
+        let some = self.powers.iter().step_by(every).copied();
+        self.noise_cells.extend(some.take(2 * NOISE_CELLS));
+        let middle = self.noise_cells.len() / 2;
+        if self.noise_cells.is_empty() {
+            return 0.0;
+        }
+        let (_, median, _) = (self.noise_cells).select_nth_unstable_by(middle, f32::total_cmp);
+        f64::from(*median) / LN_2
+    }
+}
+
+fn turns(shape: &Shape) -> Vec<Complex32> {
+    let mut turns = Vec::with_capacity(shape.transmitters * shape.loops);
+    for transmitter in 0..shape.transmitters {
+        let share = transmitter as f64 / (shape.transmitters * shape.loops) as f64;
+        turns.extend((0..shape.loops).map(|bin| {
+            let (sin, cos) = (-TAU * share * shape.signed(bin)).sin_cos();
+            Complex32::new(cos as f32, sin as f32)
+        }));
+    }
+    turns
+}
+
+/// Weights over samples and over loops.
+pub fn weights(sheet: &RadarSheet, settings: &RadarSettings) -> [Weights; 2] {
+    let shape = Shape::new(sheet);
+    let weights = |window, count| Weights::new(window, count, settings.chebyshev_db);
+    [
+        weights(settings.range_window, shape.samples),
+        weights(settings.speed_window, shape.loops),
+    ]
 }

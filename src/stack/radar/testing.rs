@@ -2,6 +2,7 @@
 //! transmitter, receiver and chirp, and thermal noise.
 
 use super::settings::RadarSettings;
+use super::window::Window;
 use crate::bus::{RadarFrame, RadarSheet, RadarWaveform, SimTime, TrainEnd};
 use crate::stack::led::testing::SplitMix64;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -176,8 +177,8 @@ pub fn frame(
 /// Without windows, for theory that has none.
 pub fn unweighted() -> RadarSettings {
     RadarSettings {
-        range_window: super::Window::Rectangular,
-        speed_window: super::Window::Rectangular,
+        range_window: Window::Rectangular,
+        speed_window: Window::Rectangular,
         ..RadarSettings::default()
     }
 }

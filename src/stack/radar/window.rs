@@ -75,6 +75,11 @@ impl Weights {
     pub fn gain(&self) -> f64 {
         self.values.iter().sum()
     }
+
+    /// Amplitude so many bins from the middle, of one there.
+    pub fn response(&self, bins: f64) -> f64 {
+        amplitude(&self.values, bins) / self.gain()
+    }
 }
 
 /// The periodic one, as for spectra.
@@ -177,11 +182,11 @@ mod tests {
                 let weights = Weights::new(window, count, db);
                 let noise_bins = 10f64.powf(0.1 * weights.loss_db);
                 assert!(
-                    (noise_bins - bandwidth).abs() < 0.025,
+                    (noise_bins - bandwidth).abs() < 0.02,
                     "{window:?} {noise_bins}"
                 );
                 assert!(
-                    (weights.width_bins - width).abs() < 0.025,
+                    (weights.width_bins - width).abs() < 0.015,
                     "{window:?} {weights:?}"
                 );
                 let side = weights.side_lobe_db;
