@@ -18,6 +18,7 @@ mod fault_matrix;
 mod faults;
 mod messages;
 mod occupancy;
+mod radar;
 mod receivers;
 mod trains;
 mod validation;
