@@ -19,7 +19,7 @@ use metrotwin::bus::{
     Content, Message, Node, RadarFrame, RadarSheet, RadarWaveform, SimTime, TrainEnd, TrainId,
 };
 use metrotwin::stack::Equipment;
-use metrotwin::stack::radar::{CfarKind, RadarSettings, RadarTracking};
+use metrotwin::stack::radar::{CfarKind, RadarTracking, RadarTrackingSettings};
 use nalgebra::Isometry3;
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -100,9 +100,9 @@ fn counts(sheet: &RadarSheet, echoes: u32) -> Vec<[i16; 2]> {
 fn report((samples, loops, receivers): (u32, u32, u32), cfar: CfarKind, echoes: u32) {
     let sheet = sheet(samples, loops, receivers);
     let node = Node::Train(TrainId(0));
-    let settings = RadarSettings {
+    let settings = RadarTrackingSettings {
         cfar,
-        ..RadarSettings::default()
+        ..RadarTrackingSettings::default()
     };
     let mut tracking = RadarTracking::new(node.clone(), settings, &sheet);
     let counts = counts(&sheet, echoes);

@@ -19,7 +19,7 @@ use metrotwin::bus::TrainEnd;
 use metrotwin::twin::random::Stream;
 use metrotwin::twin::sensors::RadarSettings;
 use metrotwin::twin::sensors::radar::Converter;
-use metrotwin::twin::sensors::radar::signal::{BeatModel, Echo, Moving};
+use metrotwin::twin::sensors::radar::signal::{BeatModel, Moving, RadarEcho};
 use nalgebra::{Point3, Vector3};
 use std::hint::black_box;
 use std::time::Instant;
@@ -27,7 +27,7 @@ use std::time::Instant;
 /// Of so many frames the least cost counts, because the machine does other things too.
 const RUNS: u32 = 7;
 
-fn echoes(count: u64) -> Vec<Echo> {
+fn echoes(count: u64) -> Vec<RadarEcho> {
     let stream = Stream::new(1, 0, "bench");
     let echo = |k: u64| {
         let draw = |n: u64| 2.0 * stream.uniform(8 * k + n) - 1.0;
@@ -37,7 +37,7 @@ fn echoes(count: u64) -> Vec<Echo> {
             place_m: Point3::from(away * (101.0 + 100.0 * draw(2))),
             velocity_mps: away * (39.0 * draw(3)),
         };
-        Echo {
+        RadarEcho {
             out: way,
             back: way,
             amplitude: 100.0,

@@ -1,4 +1,9 @@
-//! What rooms calculate alike.
+//! What rooms calculate alike, and constants of nature.
+
+/// Speed of light, m/s.
+pub(crate) const LIGHT_MPS: f64 = 299_792_458.0;
+/// Boltzmann's constant, J/K.
+pub(crate) const BOLTZMANN_JPK: f64 = 1.380_649e-23;
 
 /// Halves an interval so many times about the place where `is_low` turns from true to false; returns
 /// the two ends that are left.

@@ -11,11 +11,9 @@
 //! has the power [`RadarSheet::full_scale_dbm`] at a receiver's antenna.
 
 use super::{SimTime, TrainEnd};
+use crate::numerics::LIGHT_MPS;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
-
-/// Speed of light, m/s.
-const LIGHT_MPS: f64 = 299_792_458.0;
 
 /// How a radar sweeps its frequency, and samples what comes back.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@ use metrotwin::session::{
     Event, Observer, ObserverError, RendererChoice, RunOptions, renderer, run_with,
 };
 use metrotwin::settings::read_toml;
-use metrotwin::stack::radar::{RadarSettings, RadarTracking};
+use metrotwin::stack::radar::{RadarTracking, RadarTrackingSettings};
 use metrotwin::track::Tunnel;
 
 const SPEED_MPS: f64 = 10.0;
@@ -53,7 +53,7 @@ fn a_car_on_the_track_is_followed_where_it_stands() {
         renderer.as_mut(),
         &|fitting| {
             let node = Node::Train(TrainId(0));
-            let settings = RadarSettings::default();
+            let settings = RadarTrackingSettings::default();
             let sheet = radar.sheet(TrainEnd::Front);
             fitting.add_equipment(node.clone(), RadarTracking::new(node, settings, &sheet));
         },

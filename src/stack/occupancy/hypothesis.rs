@@ -5,9 +5,10 @@ use super::course::Course;
 use super::placing::TrackPlacing;
 use super::settings::OccupancySettings;
 use crate::bus::SimTime;
+use crate::numerics;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// How many numbers are estimated.
 pub const STATES: usize = 10;
@@ -43,7 +44,7 @@ pub fn log_sum(a: f64, b: f64) -> f64 {
 
 /// Between -pi and pi.
 pub fn wrapped(angle_rad: f64) -> f64 {
-    (angle_rad + PI).rem_euclid(TAU) - PI
+    numerics::wrapped(angle_rad, TAU)
 }
 
 /// The unit vector to the left of another one.

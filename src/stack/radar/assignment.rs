@@ -8,7 +8,7 @@
 
 /// A pair that may be: target, detection, cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair {
+pub struct AssignedPair {
     /// Number of the target.
     pub target: usize,
     /// Number of the detection.
@@ -18,11 +18,11 @@ pub struct Pair {
 }
 
 /// The detection of each target, if any. A target without one costs `missed`.
-pub fn assign(targets: usize, pairs: &[Pair], missed: &[f64]) -> Vec<Option<usize>> {
+pub fn assign(targets: usize, pairs: &[AssignedPair], missed: &[f64]) -> Vec<Option<usize>> {
     let mut assigned = vec![None; targets];
     for group in groups(targets, pairs) {
-        let own = |pair: &&Pair| group.contains(&pair.target);
-        let pairs: Vec<Pair> = pairs.iter().filter(own).copied().collect();
+        let own = |pair: &&AssignedPair| group.contains(&pair.target);
+        let pairs: Vec<AssignedPair> = pairs.iter().filter(own).copied().collect();
         let mut detections: Vec<usize> = pairs.iter().map(|pair| pair.detection).collect();
         detections.sort_unstable();
         detections.dedup();
@@ -35,9 +35,9 @@ pub fn assign(targets: usize, pairs: &[Pair], missed: &[f64]) -> Vec<Option<usiz
 }
 
 /// Targets that share detections, in order; none that has no pair.
-fn groups(targets: usize, pairs: &[Pair]) -> Vec<Vec<usize>> {
+fn groups(targets: usize, pairs: &[AssignedPair]) -> Vec<Vec<usize>> {
     let mut group_of: Vec<usize> = (0..targets).collect();
-    let mut by_detection: Vec<Pair> = pairs.to_vec();
+    let mut by_detection: Vec<AssignedPair> = pairs.to_vec();
     by_detection.sort_by_key(|pair| (pair.detection, pair.target));
     for two in by_detection.windows(2) {
         if two[0].detection == two[1].detection {
@@ -63,7 +63,12 @@ fn groups(targets: usize, pairs: &[Pair]) -> Vec<Vec<usize>> {
 }
 
 /// By target: the cost of each detection, and of none, of which each has one of its own.
-fn table(group: &[usize], detections: &[usize], pairs: &[Pair], missed: &[f64]) -> Vec<Vec<f64>> {
+fn table(
+    group: &[usize],
+    detections: &[usize],
+    pairs: &[AssignedPair],
+    missed: &[f64],
+) -> Vec<Vec<f64>> {
     let row = |(k, target): (usize, &usize)| {
         let mut row = vec![f64::INFINITY; detections.len() + group.len()];
         row[detections.len() + k] = missed[*target];
@@ -148,7 +153,7 @@ mod tests {
     use super::*;
     use crate::stack::radar::testing::Draw;
 
-    fn cost(assigned: &[Option<usize>], pairs: &[Pair], missed: &[f64]) -> f64 {
+    fn cost(assigned: &[Option<usize>], pairs: &[AssignedPair], missed: &[f64]) -> f64 {
         let of = |(target, detection): (usize, &Option<usize>)| {
             let pair = pairs
                 .iter()
@@ -159,7 +164,7 @@ mod tests {
     }
 
     /// The least cost of all ways, one by one.
-    fn by_trial(target: usize, used: u32, pairs: &[Pair], missed: &[f64]) -> f64 {
+    fn by_trial(target: usize, used: u32, pairs: &[AssignedPair], missed: &[f64]) -> f64 {
         if target == missed.len() {
             return 0.0;
         }
@@ -186,7 +191,7 @@ mod tests {
                 for detection in 0..5 {
                     let cost = 20.0 * draw.uniform() - 5.0;
                     if draw.uniform() < share {
-                        pairs.push(Pair {
+                        pairs.push(AssignedPair {
                             target,
                             detection,
                             cost,

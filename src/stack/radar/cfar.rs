@@ -12,7 +12,7 @@
 //! Source: H. M. Finn and R. S. Johnson, RCA Review 29 (1968); H. Rohling, Radar CFAR Thresholding in Clutter and
 //! Multiple Target Situations, IEEE Trans. AES 19 (1983).
 
-use super::settings::{CfarKind, RadarSettings};
+use super::settings::{CfarKind, RadarTrackingSettings};
 use crate::numerics::bisected;
 
 /// Factor on the mean of so many reference cells, for a probability of a false alarm.
@@ -43,7 +43,7 @@ struct Test {
 }
 
 impl Test {
-    fn new(settings: &RadarSettings, cells: u32) -> Self {
+    fn new(settings: &RadarTrackingSettings, cells: u32) -> Self {
         let probability = settings.false_alarm_probability;
         let order = (settings.ordered_share * f64::from(cells)).round() as u32;
         let order = order.clamp(1, cells.max(1));
@@ -74,7 +74,7 @@ pub struct Cfar {
 
 impl Cfar {
     /// For so many columns.
-    pub fn new(settings: &RadarSettings, columns: usize) -> Self {
+    pub fn new(settings: &RadarTrackingSettings, columns: usize) -> Self {
         let side = (settings.reference_cells / 2).max(1);
         Self {
             kind: settings.cfar,
@@ -161,10 +161,10 @@ mod tests {
     const COLUMNS: usize = 1000;
 
     fn cfar(kind: CfarKind, false_alarm_probability: f64) -> Cfar {
-        let settings = RadarSettings {
+        let settings = RadarTrackingSettings {
             cfar: kind,
             false_alarm_probability,
-            ..RadarSettings::default()
+            ..RadarTrackingSettings::default()
         };
         Cfar::new(&settings, COLUMNS)
     }
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn few_cells_give_no_detection() {
         let mut found = 0;
-        Cfar::new(&RadarSettings::default(), 0).detect(&[], |_, _| found += 1);
+        Cfar::new(&RadarTrackingSettings::default(), 0).detect(&[], |_, _| found += 1);
         assert_eq!(found, 0);
         for kind in [CfarKind::Ca, CfarKind::Os] {
             for rows in [0, 1, 10] {

@@ -12,15 +12,14 @@
 
 use super::angle::Speeds;
 use super::cfar::Cfar;
-use super::peak::{Cell, Echo, PeakFinder};
+use super::peak::{Cell, EchoPeak, PeakFinder};
 use super::range_doppler::{RangeDoppler, weights};
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use super::window::Weights;
 use crate::bus::{RadarDetection, RadarSheet};
+use crate::numerics::{BOLTZMANN_JPK, LIGHT_MPS};
 use std::f64::consts::PI;
 
-const LIGHT_MPS: f64 = 299_792_458.0;
-const BOLTZMANN_JPK: f64 = 1.380_649e-23;
 /// Temperature that noise figures are stated for, K.
 const REFERENCE_K: f64 = 290.0;
 
@@ -72,7 +71,7 @@ pub struct Detector {
 
 impl Detector {
     /// For a sheet.
-    pub fn new(sheet: &RadarSheet, settings: &RadarSettings) -> Self {
+    pub fn new(sheet: &RadarSheet, settings: &RadarTrackingSettings) -> Self {
         let weights = weights(sheet, settings);
         let radar = RangeDoppler::new(sheet, &weights[0], &weights[1]);
         Self {
@@ -151,7 +150,7 @@ fn sighting(
     sheet: &RadarSheet,
     [range, speed]: &[Weights; 2],
     radar: &RangeDoppler,
-    echo: &Echo,
+    echo: &EchoPeak,
     noise: f64,
 ) -> Option<Sighting> {
     let waveform = &sheet.waveform;

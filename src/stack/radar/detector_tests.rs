@@ -5,7 +5,7 @@ use crate::stack::radar::testing::{Draw, Scatterer, frame, noise_power, sheet, u
 use std::f64::consts::TAU;
 
 /// The strongest sighting of scatterers.
-fn strongest(settings: &RadarSettings, scatterers: &[Scatterer], seed: u64) -> Sighting {
+fn strongest(settings: &RadarTrackingSettings, scatterers: &[Scatterer], seed: u64) -> Sighting {
     let sheet = sheet();
     let mut detector = Detector::new(&sheet, settings);
     let frame = frame(&sheet, scatterers, 1.0, &mut Draw::new(seed));
@@ -27,7 +27,7 @@ fn expected_snr_db(sheet: &RadarSheet, range_m: f64, cross_section_m2: f64) -> f
 #[test]
 fn the_ratio_of_signal_to_noise_is_that_of_the_radar_equation() {
     let mut draw = Draw::new(11);
-    for settings in [RadarSettings::default(), unweighted()] {
+    for settings in [RadarTrackingSettings::default(), unweighted()] {
         let windows = weights(&sheet(), &settings);
         let loss_db = windows[0].loss_db + windows[1].loss_db;
         // A person, a car, a truck, the flat front of a train.
@@ -62,7 +62,7 @@ fn errors_are_the_cramer_rao_bounds() {
     let mut sheet = sheet();
     // A small frame, of which many can be drawn.
     (sheet.waveform.samples, sheet.waveform.loops) = (64, 32);
-    for (settings, seed) in [(unweighted(), 5), (RadarSettings::default(), 6)] {
+    for (settings, seed) in [(unweighted(), 5), (RadarTrackingSettings::default(), 6)] {
         let mut detector = Detector::new(&sheet, &settings);
         let mut draw = Draw::new(seed);
         let windows_db = detector.weights[0].loss_db + detector.weights[1].loss_db;
@@ -147,7 +147,7 @@ fn an_aliased_speed_does_not_turn_the_azimuth() {
     let limit = sheet.waveform.most_speed_mps(2);
     let point = Scatterer::polar(60.0, 0.2, -44.0, 10.0);
     let frame = frame(&sheet, &[point], 1.0, &mut Draw::new(1));
-    let mut detector = Detector::new(&sheet, &RadarSettings::default());
+    let mut detector = Detector::new(&sheet, &RadarTrackingSettings::default());
     // From -40 m/s it would come at 84 over ground: then it is taken not to have aliased.
     for (own_mps, fold) in [(22.0, 1), (0.0, 1), (-40.0, 0)] {
         let seen = detector.detect(&frame.counts, [own_mps, 0.0]).unwrap().0[0];
@@ -163,7 +163,7 @@ fn an_aliased_speed_does_not_turn_the_azimuth() {
 #[test]
 fn noise_is_measured_against_the_sheet() {
     let sheet = sheet();
-    let mut detector = Detector::new(&sheet, &RadarSettings::default());
+    let mut detector = Detector::new(&sheet, &RadarTrackingSettings::default());
     for (rise, expected_db) in [(1.0, 0.0), (4.0, 6.02)] {
         let frame = frame(&sheet, &[], rise, &mut Draw::new(3));
         let (seen, state) = detector.detect(&frame.counts, [0.0; 2]).unwrap();
@@ -176,7 +176,7 @@ fn noise_is_measured_against_the_sheet() {
 #[test]
 fn saturation_and_wrong_sizes_are_seen() {
     let sheet = sheet();
-    let mut detector = Detector::new(&sheet, &RadarSettings::default());
+    let mut detector = Detector::new(&sheet, &RadarTrackingSettings::default());
     let point = Scatterer::polar(2.0, 0.0, 0.0, 1e5);
     let frame = frame(&sheet, &[point], 1.0, &mut Draw::new(3));
     let (_, state) = detector.detect(&frame.counts, [0.0; 2]).unwrap();
@@ -194,7 +194,7 @@ fn any_sheet_and_any_counts_do_not_panic() {
             (sheet.waveform.samples, sheet.waveform.loops) = (samples, loops);
             sheet.waveform.start_hz *= scale;
             sheet.receivers_m = vec![[0.0, 0.0]; elements];
-            let mut detector = Detector::new(&sheet, &RadarSettings::default());
+            let mut detector = Detector::new(&sheet, &RadarTrackingSettings::default());
             for count in [0, i16::MIN, i16::MAX] {
                 let counts = vec![[count; 2]; sheet.frame_samples()];
                 assert_eq!(

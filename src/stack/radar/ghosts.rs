@@ -9,7 +9,7 @@
 //!
 //! Either way is longer than the direct one, and its echo is weaker: the wall takes its part. So a target is explained
 //! when another one, nearer and with a larger cross-section, makes it one of the two, in place and velocity, within what
-//! is known of both and of the wall. It is called a ghost when it was explained in [`RadarSettings::ghost_frames`]
+//! is known of both and of the wall. It is called a ghost when it was explained in [`RadarTrackingSettings::ghost_frames`]
 //! frames more than it was not. In a curve of radius R a wall is off its tangent by x^2 / 2 R: that is added to what is not
 //! known of the wall, from the yaw rate.
 //!
@@ -23,7 +23,7 @@
 
 use super::detector::Sighting;
 use super::own_motion::Mount;
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use super::target::{Target, View};
 use crate::numerics::wrapped;
 use nalgebra::{Matrix4, Vector2, Vector4};
@@ -42,7 +42,7 @@ const GATE_OF_2: f64 = 13.82;
 /// Finds walls, and marks ghosts.
 #[derive(Clone, Debug)]
 pub struct Ghosts {
-    settings: RadarSettings,
+    settings: RadarTrackingSettings,
     /// How far the vehicle has run, metres.
     run_m: f64,
     /// Where along the way things stand, by steps from right to left, metres.
@@ -51,7 +51,7 @@ pub struct Ghosts {
 
 impl Ghosts {
     /// Without walls.
-    pub fn new(settings: RadarSettings) -> Self {
+    pub fn new(settings: RadarTrackingSettings) -> Self {
         let steps = (2.0 * settings.wall_most_m / STEP_M).ceil().clamp(1.0, 1e5) as usize;
         Self {
             settings,
@@ -68,7 +68,7 @@ impl Ghosts {
         for k in 0..targets.len() {
             let target = &targets[k];
             let is_explained = targets.iter().any(|source| {
-                let pair = Pair {
+                let pair = MirrorPair {
                     source,
                     target,
                     view,
@@ -149,7 +149,11 @@ impl Ghosts {
 
 /// Forward and left, metres, of what has the radial speed of something that stands, where its azimuth says the distance
 /// to within a wall's spread.
-fn standing_at(seen: &Sighting, view: &View, settings: &RadarSettings) -> Option<Vector2<f64>> {
+fn standing_at(
+    seen: &Sighting,
+    view: &View,
+    settings: &RadarTrackingSettings,
+) -> Option<Vector2<f64>> {
     let Mount { place_m, yaw_rad } = view.mount;
     let detection = &seen.detection;
     let azimuth = detection.azimuth_rad + yaw_rad;
@@ -173,15 +177,15 @@ fn curvature(view: &View) -> f64 {
 }
 
 /// A target that a source may explain.
-struct Pair<'a> {
+struct MirrorPair<'a> {
     source: &'a Target,
     target: &'a Target,
     view: &'a View,
     curvature: f64,
 }
 
-impl Pair<'_> {
-    fn is_explained(&self, wall_m: f64, settings: &RadarSettings) -> bool {
+impl MirrorPair<'_> {
+    fn is_explained(&self, wall_m: f64, settings: &RadarTrackingSettings) -> bool {
         let away = |target: &Target| (target.place() - self.view.mount.place_m).norm();
         let is_nearer = away(self.source) < away(self.target);
         let is_stronger = self.source.cross_section_m2 > self.target.cross_section_m2;
@@ -194,7 +198,7 @@ impl Pair<'_> {
     }
 
     /// The source mirrored, with its covariance and that of the wall.
-    fn image(&self, wall_m: f64, settings: &RadarSettings) -> Target {
+    fn image(&self, wall_m: f64, settings: &RadarTrackingSettings) -> Target {
         let mirror = Matrix4::from_diagonal(&Vector4::new(1.0, -1.0, 1.0, -1.0));
         let mut image = self.source.clone();
         image.state = mirror * self.source.state;
@@ -274,7 +278,7 @@ mod tests {
 
     /// A confirmed target at a place with a velocity, known well.
     fn target(id: u32, state: [f64; 4], cross_section_m2: f64) -> Target {
-        let settings = RadarSettings::default();
+        let settings = RadarTrackingSettings::default();
         let mut target = Target::new(
             id,
             &seen(9.0, 0.0, 0.0, cross_section_m2),
@@ -290,7 +294,7 @@ mod tests {
     /// Sightings of a wall at 3.5 m to the left, and frames of targets after it; who is a ghost then.
     fn ghosts_among(targets: &mut [Target], has_wall: bool) -> Vec<bool> {
         let view = view();
-        let mut ghosts = Ghosts::new(RadarSettings::default());
+        let mut ghosts = Ghosts::new(RadarTrackingSettings::default());
         for x in [12.0, 18.0, 24.0, 30.0].into_iter().filter(|_| has_wall) {
             let away = Vector2::<f64>::new(x, 3.0);
             let speed_mps = -10.0 * x / away.norm();
@@ -298,7 +302,7 @@ mod tests {
             let stands = seen(away.norm(), azimuth, speed_mps, 0.1);
             ghosts.on_frame(&[stands], &mut [], &view);
         }
-        for _ in 0..RadarSettings::default().ghost_frames {
+        for _ in 0..RadarTrackingSettings::default().ghost_frames {
             ghosts.on_frame(&[], targets, &view);
         }
         targets.iter().map(|target| target.is_ghost).collect()
@@ -314,7 +318,7 @@ mod tests {
         let view = view();
         let [direct, by_wall] = [&source, &image].map(|target| target.measure(&view).unwrap().0);
         let half = 0.5 * (direct + by_wall);
-        let settings = RadarSettings::default();
+        let settings = RadarTrackingSettings::default();
         let mut mixed = Target::new(2, &seen(half.x, half.y, half.z, 0.5), &view, &settings);
         mixed.is_confirmed = true;
         let mut all = vec![source.clone(), image.clone(), mixed.clone()];
@@ -337,7 +341,7 @@ mod tests {
     #[test]
     fn a_body_is_no_wall() {
         let view = view();
-        let mut ghosts = Ghosts::new(RadarSettings::default());
+        let mut ghosts = Ghosts::new(RadarTrackingSettings::default());
         for k in 0..30 {
             let away = Vector2::<f64>::new(30.0 - 0.5 * f64::from(k), 3.0);
             let speed_mps = -10.0 * away.x / away.norm();

@@ -36,5 +36,5 @@ mod tracking;
 mod tracking_tests;
 pub mod window;
 
-pub use settings::{CfarKind, RadarSettings};
+pub use settings::{CfarKind, RadarTrackingSettings};
 pub use tracking::RadarTracking;

@@ -8,7 +8,7 @@
 use super::angle::{Direction, DirectionFinder, Speeds, turn};
 use super::interpolation::{Axis, BINS, Profile, dot};
 use super::range_doppler::{RangeDoppler, Shape};
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use super::window::{Weights, Window};
 use rustfft::num_complex::Complex32;
 
@@ -30,7 +30,7 @@ pub struct Cell {
 
 /// An echo, between cells.
 #[derive(Clone, Copy, Debug)]
-pub struct Echo {
+pub struct EchoPeak {
     /// Bins of range.
     pub range_bins: f64,
     /// Bins of speed, away positive.
@@ -60,7 +60,7 @@ pub struct PeakFinder {
     around: Vec<[Profile; BINS]>,
     values: Vec<Complex32>,
     speeds: Speeds,
-    found: Vec<Echo>,
+    found: Vec<EchoPeak>,
 }
 
 impl PeakFinder {
@@ -68,7 +68,7 @@ impl PeakFinder {
     pub fn new(
         radar: &RangeDoppler,
         [range, speed]: &[Weights; 2],
-        settings: &RadarSettings,
+        settings: &RadarTrackingSettings,
     ) -> Self {
         let shape = &radar.shape;
         let lobe = |weights: &Weights| Lobe {
@@ -105,7 +105,7 @@ impl PeakFinder {
         cells: &mut Vec<Cell>,
         least: f64,
         speeds: Speeds,
-    ) -> &[Echo] {
+    ) -> &[EchoPeak] {
         self.speeds = speeds;
         cells.retain(|cell| is_highest(radar, cell));
         cells.sort_unstable_by(|a, b| {
@@ -153,7 +153,7 @@ impl PeakFinder {
         let signed = radar.shape.signed(cell.speed) + place.speed;
         let half = 0.5 * loops as f64;
         let power = self.power(radar, cell, place);
-        self.found.push(Echo {
+        self.found.push(EchoPeak {
             range_bins: (cell.range as f64 + place.range).rem_euclid(samples as f64),
             speed_bins: (signed + half).rem_euclid(2.0 * half) - half,
             direction: place.direction,
@@ -345,7 +345,7 @@ fn summed(block: &[Profile; BINS], weights: &Profile) -> Profile {
 }
 
 /// Bins of range and speed and beams between two echoes.
-fn apart(radar: &RangeDoppler, a: &Echo, b: &Echo) -> [f64; 3] {
+fn apart(radar: &RangeDoppler, a: &EchoPeak, b: &EchoPeak) -> [f64; 3] {
     let around = |off: f64, bins: f64| off.abs().min(bins - off.abs());
     let array = &radar.array;
     let beams = (a.direction.u - b.direction.u) / array.step;

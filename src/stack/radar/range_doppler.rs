@@ -10,7 +10,7 @@
 //! and C. Waldschmidt, IEEE Microw. Wireless Compon. Lett. 27 (2017), for the turn between transmitters.
 
 use super::array::VirtualArray;
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use super::window::Weights;
 use crate::bus::RadarSheet;
 use rustfft::num_complex::Complex32;
@@ -271,7 +271,7 @@ fn turns(shape: &Shape) -> Vec<Complex32> {
 }
 
 /// Weights over samples and over loops.
-pub fn weights(sheet: &RadarSheet, settings: &RadarSettings) -> [Weights; 2] {
+pub fn weights(sheet: &RadarSheet, settings: &RadarTrackingSettings) -> [Weights; 2] {
     let shape = Shape::new(sheet);
     let weights = |window, count| Weights::new(window, count, settings.chebyshev_db);
     [

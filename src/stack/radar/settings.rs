@@ -21,7 +21,7 @@ pub enum CfarKind {
 settings! {
     /// Settings of the onboard radar.
     #[derive(Copy)]
-    pub struct RadarSettings {
+    pub struct RadarTrackingSettings {
         /// Of the samples of a chirp. Its side lobes have to hide below the noise: a train of 100 square metres has a
         /// million times the power of what can just be detected at its range.
         range_window: Window = Window::Chebyshev;
@@ -90,7 +90,7 @@ settings! {
     also check_pairs
 }
 
-impl RadarSettings {
+impl RadarTrackingSettings {
     fn check_pairs(&self, check: &mut crate::settings::Checker<'_>) {
         if self.confirm_hits > self.confirm_frames {
             let what = "has more detections than `confirm_frames` has frames";
@@ -111,10 +111,10 @@ mod tests {
     /// What is wrong together is named by its key.
     #[test]
     fn pairs_that_contradict_are_named() {
-        let settings = RadarSettings {
+        let settings = RadarTrackingSettings {
             confirm_hits: 6,
             wall_least_m: 13.0,
-            ..RadarSettings::default()
+            ..RadarTrackingSettings::default()
         };
         let mut problems = Vec::new();
         settings.check("radar", &mut problems);
@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(problems.len(), 2);
         assert!(said.contains("radar.confirm_hits") && said.contains("radar.wall_least_m"));
         problems.clear();
-        RadarSettings::default().check("radar", &mut problems);
+        RadarTrackingSettings::default().check("radar", &mut problems);
         assert!(problems.is_empty(), "{problems:?}");
     }
 }

@@ -10,7 +10,7 @@
 
 use super::detector::Sighting;
 use super::own_motion::{Mount, OwnMotion};
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use crate::numerics::wrapped;
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Rotation2, Vector2, Vector3, Vector4};
 use std::f64::consts::TAU;
@@ -80,7 +80,7 @@ pub struct Innovation {
 
 impl Target {
     /// From its first sighting. Of the speeds that it may alias from, it has that which is slowest over ground.
-    pub fn new(id: u32, seen: &Sighting, view: &View, settings: &RadarSettings) -> Self {
+    pub fn new(id: u32, seen: &Sighting, view: &View, settings: &RadarTrackingSettings) -> Self {
         let detection = &seen.detection;
         let azimuth = detection.azimuth_rad + view.mount.yaw_rad;
         let along = Vector2::new(azimuth.cos(), azimuth.sin());
@@ -118,7 +118,7 @@ impl Target {
     }
 
     /// Carries it on, as the vehicle moves.
-    pub fn predict(&mut self, own: &OwnMotion, settings: &RadarSettings) {
+    pub fn predict(&mut self, own: &OwnMotion, settings: &RadarTrackingSettings) {
         let time_s = own.time_s;
         let back = Rotation2::new(-own.turned_rad);
         let chord = Rotation2::new(0.5 * own.turned_rad) * Vector2::new(own.run_m, 0.0);
@@ -138,7 +138,7 @@ impl Target {
         self.frames = self.frames.saturating_add(1);
     }
 
-    fn disturb(&mut self, time_s: f64, settings: &RadarSettings) {
+    fn disturb(&mut self, time_s: f64, settings: &RadarTrackingSettings) {
         let acceleration = settings.acceleration_sigma_mps2.powi(2);
         for axis in 0..2 {
             self.covariance[(axis, axis)] += 0.25 * acceleration * time_s.powi(4);
@@ -159,7 +159,7 @@ impl Target {
         &self,
         seen: &Sighting,
         view: &View,
-        settings: &RadarSettings,
+        settings: &RadarTrackingSettings,
     ) -> Option<Innovation> {
         let (expected, jacobian) = self.measure(view)?;
         let detection = &seen.detection;
@@ -236,7 +236,7 @@ impl Target {
 }
 
 /// Of range, azimuth and radial speed: by noise, by where on the body it reflects, and by what the train's speed is off.
-fn variances(seen: &Sighting, settings: &RadarSettings) -> [f64; 3] {
+fn variances(seen: &Sighting, settings: &RadarTrackingSettings) -> [f64; 3] {
     let [range, azimuth, speed] = seen.sigmas;
     let across = settings.body_sigma_m / seen.detection.range_m.max(NEAREST_M);
     let own = settings.own_speed_sigma_mps.powi(2);

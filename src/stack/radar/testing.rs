@@ -1,7 +1,7 @@
 //! The signal of scatterers for the tests of this room, from the model of the bus: exact two-way delays by
 //! transmitter, receiver and chirp, and thermal noise.
 
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use super::window::Window;
 use crate::bus::{RadarFrame, RadarSheet, RadarWaveform, SimTime, TrainEnd};
 use crate::stack::led::testing::SplitMix64;
@@ -175,10 +175,10 @@ pub fn frame(
 }
 
 /// Without windows, for theory that has none.
-pub fn unweighted() -> RadarSettings {
-    RadarSettings {
+pub fn unweighted() -> RadarTrackingSettings {
+    RadarTrackingSettings {
         range_window: Window::Rectangular,
         speed_window: Window::Rectangular,
-        ..RadarSettings::default()
+        ..RadarTrackingSettings::default()
     }
 }

@@ -7,9 +7,9 @@
 //!
 //! Source: S. S. Blackman and R. Popoli, Design and Analysis of Modern Tracking Systems (1999), chapters 6 and 7.
 
-use super::assignment::{Pair, assign};
+use super::assignment::{AssignedPair, assign};
 use super::detector::Sighting;
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use super::target::{Innovation, Target, View};
 
 /// A target whose place is known no better than this is lost, metres.
@@ -18,7 +18,7 @@ const LOST_SIGMA_M: f64 = 50.0;
 /// Follows targets.
 #[derive(Clone, Debug)]
 pub struct Tracker {
-    settings: RadarSettings,
+    settings: RadarTrackingSettings,
     /// In the order of their begin.
     targets: Vec<Target>,
     next_id: u32,
@@ -26,7 +26,7 @@ pub struct Tracker {
 
 impl Tracker {
     /// Without targets.
-    pub fn new(settings: RadarSettings) -> Self {
+    pub fn new(settings: RadarTrackingSettings) -> Self {
         Self {
             settings,
             targets: Vec::new(),
@@ -96,7 +96,7 @@ impl Tracker {
                 let Some(innovation) = gated else { continue };
                 largest = largest.max(innovation.log_volume);
                 let cost = innovation.distance + innovation.log_volume;
-                pairs.push(Pair {
+                pairs.push(AssignedPair {
                     target: row,
                     detection,
                     cost,
@@ -119,7 +119,7 @@ impl Tracker {
 }
 
 /// Counts misses, and confirms.
-fn judge(target: &mut Target, settings: &RadarSettings) {
+fn judge(target: &mut Target, settings: &RadarTrackingSettings) {
     let is_hit = target.hits & 1 == 1;
     target.missed = if is_hit {
         0
@@ -130,12 +130,12 @@ fn judge(target: &mut Target, settings: &RadarSettings) {
 }
 
 /// Hits in the last frames that count.
-fn hits(target: &Target, settings: &RadarSettings) -> u32 {
+fn hits(target: &Target, settings: &RadarTrackingSettings) -> u32 {
     let frames = settings.confirm_frames.clamp(1, 32);
     (target.hits & (u32::MAX >> (32 - frames))).count_ones()
 }
 
-fn is_alive(target: &Target, settings: &RadarSettings) -> bool {
+fn is_alive(target: &Target, settings: &RadarTrackingSettings) -> bool {
     let spread_m2 = target.covariance[(0, 0)] + target.covariance[(1, 1)];
     // No number is no less than anything either.
     if !(spread_m2 < LOST_SIGMA_M.powi(2) && target.state.iter().all(|x| x.is_finite())) {

@@ -4,7 +4,7 @@ use super::clustering::{Gates, clusters};
 use super::detector::{Detector, FrameState, Sighting};
 use super::ghosts::Ghosts;
 use super::own_motion::{Mount, OwnMotions};
-use super::settings::RadarSettings;
+use super::settings::RadarTrackingSettings;
 use super::target::{Target, View};
 use super::tracker::Tracker;
 use crate::bus::{
@@ -33,7 +33,7 @@ pub struct RadarTracking {
 
 impl RadarTracking {
     /// On a node, for the radar of a sheet.
-    pub fn new(node: Node, settings: RadarSettings, sheet: &RadarSheet) -> Self {
+    pub fn new(node: Node, settings: RadarTrackingSettings, sheet: &RadarSheet) -> Self {
         let detector = Detector::new(sheet, &settings);
         let transmitters = sheet.transmitters_m.len();
         let span_mps = 2.0 * sheet.waveform.most_speed_mps(transmitters);

@@ -3,7 +3,7 @@
 use super::cfar::ordered_statistic_factor;
 use super::testing::{Draw, Scatterer, frame, half_frame_s, noise_power, sheet};
 use super::window::Weights;
-use super::{RadarSettings, RadarTracking};
+use super::{RadarTracking, RadarTrackingSettings};
 use crate::bus::{
     Content, ImuSample, Message, Node, OdometerSample, RadarFrame, RadarReport, RadarSheet,
     SimTime, TrainEnd, TrainId,
@@ -26,7 +26,7 @@ struct Run {
 }
 
 impl Run {
-    fn new(sheet: &RadarSheet, settings: RadarSettings, speed_mps: f64, seed: u64) -> Self {
+    fn new(sheet: &RadarSheet, settings: RadarTrackingSettings, speed_mps: f64, seed: u64) -> Self {
         Self {
             tracking: RadarTracking::new(NODE, settings, sheet),
             sheet: sheet.clone(),
@@ -90,7 +90,7 @@ fn snr(sheet: &RadarSheet, windows: &[Weights; 2], range_m: f64, cross_section_m
 }
 
 /// Of an echo that fluctuates (Swerling 1) by the ordered statistic: the closed form with the factor over 1 + S.
-fn detection_probability(snr: f64, settings: &RadarSettings) -> f64 {
+fn detection_probability(snr: f64, settings: &RadarTrackingSettings) -> f64 {
     let (cells, order) = (16, 12);
     let factor = ordered_statistic_factor(cells, order, settings.false_alarm_probability);
     let left = (0..order).map(|i| f64::from(cells - i));
@@ -102,7 +102,7 @@ fn detection_probability(snr: f64, settings: &RadarSettings) -> f64 {
 /// frames begins with a detection and ends when it can no longer succeed.
 fn drawn_range_m(
     draw: &mut Draw,
-    settings: &RadarSettings,
+    settings: &RadarTrackingSettings,
     (from_m, step_m): (f64, f64),
     probability: &dyn Fn(f64) -> f64,
 ) -> f64 {
@@ -131,7 +131,7 @@ fn followed_range_m(
     cross_section_m2: f64,
     seed: u64,
 ) -> f64 {
-    let mut run = Run::new(sheet, RadarSettings::default(), speed_mps, seed);
+    let mut run = Run::new(sheet, RadarTrackingSettings::default(), speed_mps, seed);
     let mut range_m = from_m + run.draw.uniform();
     while range_m > 1.0 {
         let area = cross_section_m2 * run.draw.exponential();
@@ -153,7 +153,7 @@ fn followed_range_m(
 /// range drifts through them, and its loss between them is in the theory.
 #[test]
 fn val_targets_are_followed_from_where_theory_says() {
-    let (sheet, settings) = (short_sheet(), RadarSettings::default());
+    let (sheet, settings) = (short_sheet(), RadarTrackingSettings::default());
     let windows = super::range_doppler::weights(&sheet, &settings);
     let speed_mps = 6.0 * sheet.waveform.speed_bin_mps(2);
     for (area_m2, from_m) in [(0.5, 70.0), (10.0, 140.0)] {
@@ -203,7 +203,7 @@ fn a_standing_target_has_no_speed_over_ground() {
             Isometry3::new(Vector3::new(0.5, 0.8, 1.0), Vector3::z() * yaw_rad);
         let train_mps = if end == TrainEnd::Front { 12.0 } else { -12.0 };
         let (yaw_rate_radps, frames) = (0.04, 60);
-        let mut run = Run::new(&sheet, RadarSettings::default(), 12.0, 9);
+        let mut run = Run::new(&sheet, RadarTrackingSettings::default(), 12.0, 9);
         run.yaw_rate_radps = yaw_rate_radps;
         let world = Point3::new(if train_mps > 0.0 { 70.0 } else { 25.0 }, 2.0, 1.0);
         let mut last = None;
@@ -249,7 +249,7 @@ fn a_standing_target_has_no_speed_over_ground() {
 /// A train that comes near at more than the speeds that alias: by the train's own speed it has its real one.
 #[test]
 fn an_oncoming_train_has_its_speed_in_spite_of_aliasing() {
-    let mut run = Run::new(&short_sheet(), RadarSettings::default(), 22.0, 3);
+    let mut run = Run::new(&short_sheet(), RadarTrackingSettings::default(), 22.0, 3);
     let mut range_m = 150.0;
     let mut last = None;
     while range_m > 60.0 {
@@ -269,7 +269,7 @@ fn images_in_a_wall_are_ghosts_and_people_are_not() {
     for has_walls in [true, false] {
         let sheet = sheet();
         let train_mps = 8.0;
-        let mut run = Run::new(&sheet, RadarSettings::default(), train_mps, 13);
+        let mut run = Run::new(&sheet, RadarTrackingSettings::default(), train_mps, 13);
         let mut report = None;
         for k in -50..60 {
             let time_s = FRAME_S * f64::from(k);
@@ -325,7 +325,7 @@ fn images_in_a_wall_are_ghosts_and_people_are_not() {
 #[test]
 fn wrong_messages_are_left_out() {
     let sheet = short_sheet();
-    let mut run = Run::new(&sheet, RadarSettings::default(), f64::NAN, 1);
+    let mut run = Run::new(&sheet, RadarTrackingSettings::default(), f64::NAN, 1);
     run.yaw_rate_radps = f64::INFINITY;
     let report = run.frame(&[Scatterer::polar(20.0, 0.0, 0.0, 10.0)]);
     assert_eq!(report.detections.len(), 1);

@@ -23,13 +23,12 @@
 
 use super::ClockSettings;
 use crate::bus::{DopplerSample, TrainEnd, TrainId};
+use crate::numerics::LIGHT_MPS;
 use crate::settings::{Checker, settings};
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::f64::consts::{LN_2, PI};
-
-const LIGHT_MPS: f64 = 299_792_458.0;
 
 settings! {
     /// A Doppler radar that looks at the track bed. Defaults are of the usual 24 GHz class.

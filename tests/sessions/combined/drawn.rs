@@ -50,7 +50,7 @@ pub struct Fault {
 }
 
 /// What is seen of a run, ten times a second.
-pub struct Seen<'a> {
+pub struct RunStep<'a> {
     pub time_s: f64,
     /// Where the head really is.
     pub place_m: f64,
@@ -149,7 +149,7 @@ impl DrawnRun<'_> {
     }
 
     /// Runs it, and shows every step.
-    pub fn run(&self, mut see: impl FnMut(&Seen<'_>)) {
+    pub fn run(&self, mut see: impl FnMut(&RunStep<'_>)) {
         let settings = &self.settings;
         let draws = |name: &str| Stream::new(self.number, 0, name);
         let [odometer, fixes, tags, missed] = ["odometer", "fix", "tag", "missed"].map(draws);
@@ -275,7 +275,7 @@ impl DrawnRun<'_> {
                 next_unread += 1;
             }
             let alarms = positioning.take_alarms();
-            see(&Seen {
+            see(&RunStep {
                 time_s,
                 place_m: motion.place_m,
                 zone,

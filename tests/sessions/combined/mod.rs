@@ -2,13 +2,13 @@
 
 mod drawn;
 
-use drawn::{DrawnRun, Fault, SEEN_S, Seen, Wrong};
+use drawn::{DrawnRun, Fault, RunStep, SEEN_S, Wrong};
 use metrotwin::stack::combined::{CombinedSettings, Failure, Grade, Source, Sources, Zone};
 use std::collections::BTreeMap;
 
 const RUNS: u64 = 100;
 
-fn run(number: u64, faults: &[Fault], see: impl FnMut(&Seen<'_>)) {
+fn run(number: u64, faults: &[Fault], see: impl FnMut(&RunStep<'_>)) {
     let settings = CombinedSettings::default();
     DrawnRun {
         number,

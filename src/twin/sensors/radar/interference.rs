@@ -13,8 +13,9 @@
 
 use super::converter::counts_of;
 use super::link::{Antenna, Link, watts};
-use super::signal::{LIGHT_MPS, Moving, elements};
+use super::signal::{Moving, elements};
 use crate::bus::{RadarSheet, RadarWaveform};
+use crate::numerics::LIGHT_MPS;
 use crate::settings::{Checker, settings};
 use crate::twin::random::Stream;
 use nalgebra::{Complex, Point3};

@@ -15,11 +15,11 @@
 //!
 //! Not modelled: rain, attenuation by gases (under 0.5 dB/km at 77 GHz), the radiation of a warm scene, near fields.
 
+use crate::numerics::BOLTZMANN_JPK;
 use crate::twin::air::Air;
 use nalgebra::Vector3;
 use std::f64::consts::{LN_2, PI};
 
-const BOLTZMANN_J_K: f64 = 1.380_649e-23;
 const NOISE_K: f64 = 290.0;
 /// Air in a tunnel.
 const AIR_C: f64 = 15.0;
@@ -87,7 +87,7 @@ impl Link {
 
 /// Power of thermal noise in a band, W.
 pub fn noise_w(band_hz: f64, noise_figure_db: f64) -> f64 {
-    BOLTZMANN_J_K * NOISE_K * band_hz * ratio(noise_figure_db)
+    BOLTZMANN_JPK * NOISE_K * band_hz * ratio(noise_figure_db)
 }
 
 /// What the air takes at a frequency, dB/m.

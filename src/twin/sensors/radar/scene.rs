@@ -4,9 +4,9 @@ use super::converter::counts_of;
 use super::ghosts::{Image, Mirror, images};
 use super::interference::{Interferer, Sweeps};
 use super::link::{Link, air_loss_db_m, noise_w, ratio, watts};
-use super::scatterers::{BodyEchoes, Centre, RadarSight, Seen, SeenBody, clutter};
+use super::scatterers::{BodyEchoes, Centre, OwnedBody, RadarSight, SeenBody, clutter};
 use super::settings::TrueRadar;
-use super::signal::{Echo, Moving};
+use super::signal::{Moving, RadarEcho};
 use super::{MountedRadar, RadarSettings};
 use crate::bus::{SimTime, TrainEnd, TrainId};
 use crate::twin::air::Air;
@@ -34,7 +34,7 @@ struct Pose {
 /// What reaches a radar.
 pub struct Received {
     /// Echoes.
-    pub echoes: Vec<Echo>,
+    pub echoes: Vec<RadarEcho>,
     /// Radars that it hears.
     pub interferers: Vec<Interferer>,
 }
@@ -121,11 +121,11 @@ impl RadarScene {
         let seen = bodies
             .iter()
             .zip(&owners)
-            .map(|(body, &owner)| Seen { body, owner });
+            .map(|(body, &owner)| OwnedBody { body, owner });
         let sight = RadarSight::new(&self.caster, seen, (radar, self.near));
         let centres = self.body_centres(world, (&bodies, &owners), &radar, frame);
         let direct = self.heard(centres, &pose, |c| sight.sees(&c.place, of_person(c)));
-        let mut echoes: Vec<Echo> = direct.iter().map(|(_, echo)| *echo).collect();
+        let mut echoes: Vec<RadarEcho> = direct.iter().map(|(_, echo)| *echo).collect();
         echoes.extend(self.mirrored(world, &direct, &pose, &sight));
         let around = self.heard(self.clutter(world, &radar), &pose, |c| {
             sight.sees(&c.place, None)
@@ -186,7 +186,7 @@ impl RadarScene {
         centres: Vec<Centre>,
         pose: &Pose,
         is_seen: impl Fn(&Centre) -> bool,
-    ) -> Vec<(Centre, Echo)> {
+    ) -> Vec<(Centre, RadarEcho)> {
         let echo = |centre: Centre| {
             let way = pose.moving(&centre.place, &centre.velocity_mps);
             let echo = self.echo(&centre, [way, way], 0)?;
@@ -196,7 +196,7 @@ impl RadarScene {
     }
 
     /// The echo of a centre by a way out and a way back, after some bounces; none that is too faint.
-    fn echo(&self, centre: &Centre, [out, back]: [Moving; 2], bounces: u32) -> Option<Echo> {
+    fn echo(&self, centre: &Centre, [out, back]: [Moving; 2], bounces: u32) -> Option<RadarEcho> {
         let gains = [
             self.built.transmit.gain(&out.place_m.coords),
             self.built.receive.gain(&back.place_m.coords),
@@ -204,7 +204,7 @@ impl RadarScene {
         let ways_m = [out, back].map(|way| way.place_m.coords.norm());
         let lost = ratio(-self.settings.wall_loss_db * f64::from(bounces));
         let power_w = self.link.echo_w(centre.section_m2, gains, ways_m) * lost;
-        (power_w > self.faint_w).then(|| Echo {
+        (power_w > self.faint_w).then(|| RadarEcho {
             out,
             back,
             amplitude: counts_of(&self.built.figures, power_w),
@@ -216,11 +216,11 @@ impl RadarScene {
     fn mirrored(
         &self,
         world: &World,
-        direct: &[(Centre, Echo)],
+        direct: &[(Centre, RadarEcho)],
         pose: &Pose,
         sight: &RadarSight<'_>,
-    ) -> Vec<Echo> {
-        let mut by_owner: BTreeMap<BodyOwner, Vec<&(Centre, Echo)>> = BTreeMap::new();
+    ) -> Vec<RadarEcho> {
+        let mut by_owner: BTreeMap<BodyOwner, Vec<&(Centre, RadarEcho)>> = BTreeMap::new();
         for one in direct {
             if let Some(owner) = one.0.owner {
                 by_owner.entry(owner).or_default().push(one);
@@ -246,7 +246,7 @@ impl RadarScene {
         direct: Moving,
         image: &Image,
         pose: &Pose,
-    ) -> impl Iterator<Item = Echo> {
+    ) -> impl Iterator<Item = RadarEcho> {
         let over = pose.moving(&image.place, &image.velocity_mps);
         let ways = [([over, direct], 1), ([direct, over], 1), ([over, over], 2)];
         ways.map(|(ways, bounces)| self.echo(centre, ways, bounces))

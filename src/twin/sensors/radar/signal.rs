@@ -18,12 +18,12 @@
 //! Blocks of loops are computed on all cores; each is the same whatever their number.
 
 use crate::bus::{RadarSheet, RadarWaveform};
+use crate::numerics::LIGHT_MPS;
 use nalgebra::{Complex, DMatrix, Point3, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-pub(super) const LIGHT_MPS: f64 = 299_792_458.0;
 /// Loops that have one tone for an echo.
 const LOOPS_TOGETHER: usize = 8;
 /// Samples of a tone that are advanced together.
@@ -54,7 +54,7 @@ impl Moving {
 
 /// An echo: where a scatterer is seen on the way out and on the way back. They differ where a wall mirrors one of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Echo {
+pub struct RadarEcho {
     /// As transmitters see it.
     pub out: Moving,
     /// As receivers see it.
@@ -92,7 +92,7 @@ impl BeatModel<'_> {
     }
 
     /// All samples, one after the other by the model itself: by loop, transmitter, receiver, sample. Slow.
-    pub fn reference(&self, echoes: &[Echo]) -> Vec<Complex<f64>> {
+    pub fn reference(&self, echoes: &[RadarEcho]) -> Vec<Complex<f64>> {
         let (figures, waveform) = (self.figures, &self.figures.waveform);
         let (senders, receivers) = (
             elements(&figures.transmitters_m),
@@ -126,7 +126,7 @@ impl BeatModel<'_> {
     }
 
     /// The same as a product of matrices.
-    pub fn samples(&self, echoes: &[Echo]) -> Vec<Complex<f32>> {
+    pub fn samples(&self, echoes: &[RadarEcho]) -> Vec<Complex<f32>> {
         let figures = self.figures;
         let a_loop = figures.channels() * figures.waveform.samples as usize;
         let mut samples = vec![Complex::default(); figures.frame_samples()];
@@ -142,7 +142,7 @@ impl BeatModel<'_> {
     }
 
     /// The samples of a few loops.
-    fn block(&self, echoes: &[Echo], loops: Range<usize>, samples: &mut [Complex<f32>]) {
+    fn block(&self, echoes: &[RadarEcho], loops: Range<usize>, samples: &mut [Complex<f32>]) {
         let count = self.figures.waveform.samples as usize;
         let middle_s = 0.5 * (self.chirp_s(loops.start, 0) + self.chirp_s(loops.end, 0));
         let product = self.tones(echoes, middle_s) * self.amplitudes(echoes, loops, middle_s);
@@ -155,7 +155,7 @@ impl BeatModel<'_> {
     }
 
     /// Four columns of an echo, real parts over imaginary ones: its tone e about the chirp's middle, i e, x e and i x e.
-    fn tones(&self, echoes: &[Echo], at_s: f64) -> DMatrix<f32> {
+    fn tones(&self, echoes: &[RadarEcho], at_s: f64) -> DMatrix<f32> {
         let count = self.figures.waveform.samples as usize;
         let mut tones = DMatrix::zeros(2 * count, 4 * echoes.len());
         let along: Vec<f32> = (0..count).map(|k| self.along(k) as f32).collect();
@@ -190,7 +190,7 @@ impl BeatModel<'_> {
     }
 
     /// Real and imaginary parts of an echo's tone over a chirp, 1 at its middle.
-    fn tone(&self, echo: &Echo, at_s: f64) -> [Vec<f32>; 2] {
+    fn tone(&self, echo: &RadarEcho, at_s: f64) -> [Vec<f32>; 2] {
         let waveform = &self.figures.waveform;
         let [[out_m, out_mps], [back_m, back_mps]] =
             [echo.out, echo.back].map(|way| way.range(at_s));
@@ -221,7 +221,7 @@ impl BeatModel<'_> {
     }
 
     /// In each column those of a chirp and receiver: four rows of an echo, a and i q a, each real part over imaginary one.
-    fn amplitudes(&self, echoes: &[Echo], loops: Range<usize>, tones_s: f64) -> DMatrix<f32> {
+    fn amplitudes(&self, echoes: &[RadarEcho], loops: Range<usize>, tones_s: f64) -> DMatrix<f32> {
         let figures = self.figures;
         let (senders, receivers) = (
             elements(&figures.transmitters_m),

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 use super::scatterers::{BodyEchoSettings, ClutterSettings};
-use super::signal::{Echo, Moving};
+use super::signal::{Moving, RadarEcho};
 use super::*;
 use crate::bus::{RadarSheet, TrainCommand};
 use crate::track::Tunnel;
@@ -84,7 +84,7 @@ fn a_point_stands_out_by_the_radar_equation() {
             place_m: Point3::new(range_m, 0.0, 0.0),
             velocity_mps: Vector3::new(-5.0, 0.0, 0.0),
         };
-        let echo = Echo {
+        let echo = RadarEcho {
             out: way,
             back: way,
             amplitude: converter::counts_of(&figures, power_w),

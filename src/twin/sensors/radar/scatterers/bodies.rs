@@ -19,7 +19,7 @@
 //! polarisation; the sum of several bounces within a body.
 
 use super::Centre;
-use super::facet::{Facet, Surface, reflectivity_of};
+use super::facet::{EchoSurface, Facet, reflectivity_of};
 use super::shapes::{facets, piece_m};
 use crate::settings::settings;
 use crate::twin::geometry::{Body, Shape};
@@ -115,7 +115,7 @@ impl BodyEchoes {
         sections.sum::<f64>() / f64::from(steps)
     }
 
-    fn surface(&self, material: ObstacleMaterial) -> Surface {
+    fn surface(&self, material: ObstacleMaterial) -> EchoSurface {
         let reflectivity = match material {
             ObstacleMaterial::Metal => 1.0,
             ObstacleMaterial::Vehicle => self.vehicle_gain,
@@ -124,7 +124,7 @@ impl BodyEchoes {
             ObstacleMaterial::Plastic => reflectivity_of(2.3),
             ObstacleMaterial::Cardboard => reflectivity_of(1.3),
         };
-        Surface {
+        EchoSurface {
             reflectivity,
             slope_rad: match material {
                 ObstacleMaterial::Vehicle => PANEL_RAD,
@@ -140,7 +140,7 @@ impl BodyEchoes {
             BodyOwner::Worker(number) => self.limb(seen, number, frame),
             BodyOwner::Car(..) if matches!(seen.body.shape, Shape::Sphere(_)) => Vec::new(),
             BodyOwner::Car(..) => {
-                let surface = Surface {
+                let surface = EchoSurface {
                     slope_rad: self.settings.train_slope_deg.to_radians(),
                     ..self.surface(ObstacleMaterial::Metal)
                 };
@@ -182,7 +182,12 @@ impl BodyEchoes {
         }
     }
 
-    fn pieces(&self, seen: &SeenBody<'_>, surface: &Surface, radar: &Point3<f64>) -> Vec<Centre> {
+    fn pieces(
+        &self,
+        seen: &SeenBody<'_>,
+        surface: &EchoSurface,
+        radar: &Point3<f64>,
+    ) -> Vec<Centre> {
         let pose = seen.body.world_from_body;
         let at = pose.inverse_transform_point(radar);
         let half = seen.body.shape.half_extents_m();

@@ -21,7 +21,7 @@ const GRAZING: f64 = 1e-3;
 
 /// How a surface echoes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
+pub struct EchoSurface {
     /// Share of power that it reflects at normal incidence.
     pub reflectivity: f64,
     /// Standard deviation of its slopes each way, radians.
@@ -45,7 +45,7 @@ pub struct Facet {
 
 impl Facet {
     /// Cross-section for a radar in a unit direction from it; zero from behind.
-    pub fn section_m2(&self, towards: &Vector3<f64>, surface: &Surface, wave_m: f64) -> f64 {
+    pub fn section_m2(&self, towards: &Vector3<f64>, surface: &EchoSurface, wave_m: f64) -> f64 {
         let cosine = self.normal.dot(towards);
         if cosine <= GRAZING {
             return 0.0;
@@ -83,7 +83,7 @@ mod tests {
             round_rad: 0.0,
         };
         for (slope_rad, diffuse) in [(0.05, 0.0), (0.05, 0.3), (0.1, 0.0), (0.02, 1.0)] {
-            let surface = Surface {
+            let surface = EchoSurface {
                 reflectivity: 1.0,
                 slope_rad,
                 diffuse,
@@ -114,7 +114,7 @@ mod tests {
             area_m2: 1e-4,
             round_rad: 0.0,
         };
-        let surface = Surface {
+        let surface = EchoSurface {
             reflectivity: 1.0,
             slope_rad: 1e-3,
             diffuse: 0.0,

@@ -15,7 +15,7 @@ mod sight;
 
 pub use bodies::{BodyEchoSettings, BodyEchoes, SeenBody};
 pub use clutter::{ClutterSettings, clutter};
-pub use sight::{RadarSight, Seen};
+pub use sight::{OwnedBody, RadarSight};
 
 use crate::twin::physics::BodyOwner;
 use nalgebra::{Point3, Vector3};

@@ -135,7 +135,7 @@ fn hull_facets(hull: &Hull) -> Vec<Facet> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::facet::Surface;
+    use super::super::facet::EchoSurface;
     use super::*;
     use std::sync::Arc;
 
@@ -180,7 +180,7 @@ mod tests {
     /// A metal ball echoes pi r^2 from all sides, within the graininess of its pieces.
     #[test]
     fn val_a_ball_echoes_its_shadow() {
-        let surface = Surface {
+        let surface = EchoSurface {
             reflectivity: 1.0,
             slope_rad: 0.05,
             diffuse: 0.3,

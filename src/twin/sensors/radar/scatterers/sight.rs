@@ -10,7 +10,7 @@ const NEAR_M: f64 = 0.05;
 const WALL_M: f64 = 0.1;
 
 /// A body with its owner, at the time of a frame.
-pub struct Seen<'a> {
+pub struct OwnedBody<'a> {
     /// The body.
     pub body: &'a Body,
     /// What it belongs to.
@@ -20,7 +20,7 @@ pub struct Seen<'a> {
 /// What is between places.
 pub struct RadarSight<'a> {
     caster: &'a TunnelCaster,
-    bodies: Vec<(Seen<'a>, f64)>,
+    bodies: Vec<(OwnedBody<'a>, f64)>,
     radar: Point3<f64>,
     begin: RayStart,
 }
@@ -29,10 +29,10 @@ impl<'a> RadarSight<'a> {
     /// From a radar at a place, among bodies.
     pub fn new(
         caster: &'a TunnelCaster,
-        bodies: impl IntoIterator<Item = Seen<'a>>,
+        bodies: impl IntoIterator<Item = OwnedBody<'a>>,
         (radar, near): (Point3<f64>, Option<RayStart>),
     ) -> Self {
-        let with_size = |seen: Seen<'a>| {
+        let with_size = |seen: OwnedBody<'a>| {
             let size_m = seen.body.shape.half_extents_m().norm();
             (seen, size_m)
         };

@@ -12,12 +12,12 @@ fn figures(loops: u32) -> RadarSheet {
 }
 
 /// An echo of the same way out and back.
-fn echo(place_m: Point3<f64>, velocity_mps: Vector3<f64>, amplitude: f64) -> Echo {
+fn echo(place_m: Point3<f64>, velocity_mps: Vector3<f64>, amplitude: f64) -> RadarEcho {
     let way = Moving {
         place_m,
         velocity_mps,
     };
-    Echo {
+    RadarEcho {
         out: way,
         back: way,
         amplitude,
@@ -26,7 +26,7 @@ fn echo(place_m: Point3<f64>, velocity_mps: Vector3<f64>, amplitude: f64) -> Ech
 }
 
 /// Echoes all over the field of view, faster than a number to either way at most, every third by different ways.
-fn crowd(count: u64, fastest_mps: f64) -> Vec<Echo> {
+fn crowd(count: u64, fastest_mps: f64) -> Vec<RadarEcho> {
     let stream = Stream::new(5, 0, "crowd");
     let one = |k: u64| {
         let draw = |n: u64| 2.0 * stream.uniform(16 * k + n) - 1.0;
@@ -50,7 +50,7 @@ fn channels(figures: &RadarSheet) -> Vec<Complex<f64>> {
 }
 
 /// Power of the difference to the reference over that of the reference, dB.
-fn error_db(echoes: &[Echo], loops: u32) -> f64 {
+fn error_db(echoes: &[RadarEcho], loops: u32) -> f64 {
     let figures = figures(loops);
     let model = BeatModel {
         figures: &figures,
